@@ -1,0 +1,1 @@
+"""The commands of `dnet`: a frozen dataclass each, whose fields are the options."""

@@ -1,0 +1,199 @@
+"""Everything that dnet refuses, under one root: what it was, its value, the limit, the way out."""
+
+from pathlib import Path
+
+
+class DnetError(Exception):
+    """The root: the command prints these in one line and exits with 1."""
+
+
+class ShortCloud(DnetError, ValueError):
+    """A cloud with fewer points than were asked of it."""
+
+    def __init__(self, got: int, want: int) -> None:
+        super().__init__(f"cloud has {got} points, need at least {want}; is the object in view?")
+
+
+class LongCloud(DnetError, ValueError):
+    """A cloud with more points than a network takes."""
+
+    def __init__(self, what: str, got: int, want: int) -> None:
+        super().__init__(
+            f"{what} has {got} points, the network takes {want}; "
+            f"sample it with `farthest_points(cloud, {want})`"
+        )
+
+
+class BadCloud(DnetError, ValueError):
+    """A cloud with coordinates that are not numbers."""
+
+    def __init__(self, what: str, bad: int, total: int) -> None:
+        super().__init__(
+            f"{what} has {bad} of {total} points with NaN or infinite coordinates; remove them"
+        )
+
+
+class TooFew(DnetError, ValueError):
+    """A count below what makes sense."""
+
+    def __init__(self, what: str, got: float, least: float) -> None:
+        super().__init__(f"{what} is {got}, must be at least {least}")
+
+
+class MissingPath(DnetError, FileNotFoundError):
+    """A file or directory that is not there."""
+
+    def __init__(self, path: Path, what: str, hint: str) -> None:
+        super().__init__(f"{what} {path} does not exist; {hint}")
+
+
+class NoEpisodes(DnetError, FileNotFoundError):
+    """A directory without a single finished episode."""
+
+    def __init__(self, path: Path, why: str = "holds no .mcap episode") -> None:
+        super().__init__(f"{path} {why}; record some with `dnet record {path}`")
+
+
+class OccupiedOutput(DnetError, FileExistsError):
+    """An output directory that already holds a run."""
+
+    def __init__(self, path: Path, holds: str) -> None:
+        super().__init__(
+            f"output {path} already holds {holds}; choose another directory or remove it first"
+        )
+
+
+class BadEpisode(DnetError, ValueError):
+    """A file that is not an episode, or not a whole one."""
+
+    def __init__(self, path: Path, why: str, hint: str) -> None:
+        super().__init__(f"{path} {why}; {hint}")
+
+
+class NoSuchFrame(DnetError, IndexError):
+    """A frame number beyond the end of an episode."""
+
+    def __init__(self, path: Path, frame: int, count: int) -> None:
+        super().__init__(
+            f"{path} has no frame {frame}: it has {count} frames, 0 to {count - 1}; "
+            f"`dnet inspect info {path}` lists them"
+        )
+
+
+class BadCheckpoint(DnetError, ValueError):
+    """A checkpoint that does not hold the network that was asked for."""
+
+    def __init__(self, path: Path, why: str, hint: str) -> None:
+        super().__init__(f"checkpoint {path} {why}; {hint}")
+
+
+class Unreachable(DnetError, ValueError):
+    """A pose that the arm cannot take within its limits."""
+
+    def __init__(self, what: str, point: tuple[float, float, float], why: str) -> None:
+        x, y, z = point
+        super().__init__(
+            f"{what} at ({x:.4f}, {y:.4f}, {z:.4f}) m is out of reach: {why}; "
+            "choose a point nearer the middle of the workspace"
+        )
+
+
+class BackInTime(DnetError, ValueError):
+    """A frame that is older than the one before it."""
+
+    def __init__(self, path: Path, time: float, last: float) -> None:
+        super().__init__(
+            f"{path}: a frame at {time:.6f} s came after one at {last:.6f} s; "
+            "add frames in the order in which they were seen"
+        )
+
+
+class BadNumber(DnetError, ValueError):
+    """A value with NaN or infinity where a log must hold numbers."""
+
+    def __init__(self, path: Path, what: str, time: float) -> None:
+        super().__init__(
+            f"{path}: {what} at {time:.6f} s holds NaN or infinity; "
+            "the simulation has diverged, record this pair with another seed"
+        )
+
+
+class NotAFraction(DnetError, ValueError):
+    """A share outside 0 to 1."""
+
+    def __init__(self, what: str, got: float) -> None:
+        super().__init__(f"{what} is {got}, must be from 0 to 1")
+
+
+class EmptyGrasp(DnetError, ValueError):
+    """Jaws that would close on nothing."""
+
+    def __init__(self, point: tuple[float, float, float], distance: float, radius: float) -> None:
+        x, y, z = point
+        super().__init__(
+            f"nothing to grasp at ({x:.4f}, {y:.4f}, {z:.4f}) m: the nearest node is "
+            f"{distance * 1e3:.1f} mm away, jaws reach {radius * 1e3:.1f} mm; "
+            "choose a point on the object's surface"
+        )
+
+
+class NoValidShape(DnetError, RuntimeError):
+    """Random draws of which none will do."""
+
+    def __init__(self, what: str, tries: int, rejected: dict[str, int]) -> None:
+        reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(rejected.items()))
+        super().__init__(
+            f"no valid {what} in {tries} random draws ({reasons}); "
+            "make the workspace smaller or the object softer to move"
+        )
+
+
+class BadMotion(DnetError, ValueError):
+    """A controller that asks for a motion that is no motion."""
+
+    def __init__(self, motion: object, step: int) -> None:
+        super().__init__(
+            f"step {step}: the predicted motion is {motion}, must be finite; "
+            "the checkpoint is spoilt, train again"
+        )
+
+
+class UnknownRecording(DnetError, ValueError):
+    """A file that no viewer of ours opens."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            f"{path} ends in {path.suffix or 'nothing'}, not in .mcap or .rrd; "
+            "give an episode of `dnet record` or a run of `dnet servo`"
+        )
+
+
+class NoScreen(DnetError, RuntimeError):
+    """A viewer that was to open a window where there is no screen."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "no screen: neither DISPLAY nor WAYLAND_DISPLAY is set; draw a picture with "
+            "--screenshot OUT.png, or write --save OUT.rrd and open it on another machine"
+        )
+
+
+class NoPicture(DnetError, RuntimeError):
+    """A viewer that did not draw."""
+
+    def __init__(self, path: Path, tries: int, why: str) -> None:
+        super().__init__(
+            f"the viewer drew no picture of {path} in {tries} tries ({why}); without a screen it "
+            "needs a software renderer: on Debian, apt-get install mesa-vulkan-drivers libegl1 "
+            "libxkbcommon0 libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2"
+        )
+
+
+class ViewerFailed(DnetError, RuntimeError):
+    """A viewer that ended by an error."""
+
+    def __init__(self, status: int) -> None:
+        super().__init__(
+            f"the Rerun viewer ended with status {status}; its own message is above; "
+            "--screenshot OUT.png draws without a screen"
+        )

@@ -1,0 +1,1 @@
+"""Points in space: sampling, neighbours, distances, poses and the camera model."""

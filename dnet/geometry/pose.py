@@ -1,0 +1,63 @@
+"""Rigid transforms as 4x4 matrices: rotation above, translation in the last column."""
+
+import numpy as np
+from jaxtyping import Float64
+from scipy.spatial.transform import Rotation
+
+from dnet.types import Point, Pose, Transform
+
+Rotation3 = Float64[np.ndarray, "3 3"]
+
+
+def rotation_x(angle: float) -> Rotation3:
+    """Return the rotation by `angle` about x."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def rotation_z(angle: float) -> Rotation3:
+    """Return the rotation by `angle` about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def pose(rotation: Rotation3, translation: Point) -> Pose:
+    """Return the 4x4 matrix of a rotation followed by a translation."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def inverse(matrix: Pose) -> Pose:
+    """Return the inverse of a rigid transform, exact to rounding."""
+    rotation = matrix[:3, :3].T
+    return pose(rotation, -rotation @ matrix[:3, 3])
+
+
+def quaternion(rotation: Rotation3) -> Float64[np.ndarray, "4"]:
+    """Return the unit quaternion x y z w of a rotation, with w >= 0."""
+    return np.asarray(Rotation.from_matrix(rotation).as_quat(canonical=True), dtype=np.float64)
+
+
+def transform(parent: str, child: str, matrix: Pose) -> Transform:
+    """Return the named transform of `child` in `parent`."""
+    return Transform(parent, child, matrix[:3, 3].copy(), quaternion(matrix[:3, :3]))
+
+
+def look_at(eye: Point, target: Point) -> Pose:
+    """Return the pose of a camera at `eye` that looks at `target`, upright.
+
+    The optical convention: x right, y down, z forward.
+
+    Raises:
+        ValueError: If the camera would look straight up or down.
+    """
+    forward = target - eye
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    length = float(np.linalg.norm(right))
+    if length < 1e-9:
+        raise ValueError(f"a camera at {eye} that looks at {target} has no upright; move it aside")
+    right /= length
+    return pose(np.column_stack([right, np.cross(forward, right), forward]), eye)

@@ -1,0 +1,185 @@
+"""Density-weighted set abstraction: a convolution over points (PointConv; Wu, Qi, Fuxin 2019).
+
+The layers are those of the paper; the order of operations is chosen for a CPU. A linear layer
+commutes with gathering, so it is applied to the points before they are gathered; channels lie
+last, so that layers are plain matrix products; the two small networks on offsets and densities
+have so few channels that theirs lie first instead, over one long row axis.
+"""
+
+from itertools import pairwise
+from typing import Literal
+
+import torch
+from jaxtyping import Float, Integer
+from torch import Tensor, nn
+from torch.nn import functional
+
+Norm = Literal["group", "batch"]
+"""`group`: over all channels of one cloud; `batch`: each channel over all clouds of a batch."""
+
+
+class GroupNorm(nn.Module):
+    """GroupNorm(1, C) of activations with the batch first (Wu, He 2018)."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.ones(channels))
+        self.bias = nn.Parameter(torch.zeros(channels))
+        self.epsilon = 1e-5
+
+    def forward(self, x: Float[Tensor, "b *rows c"]) -> Float[Tensor, "b *rows c"]:
+        """Normalise with channels last."""
+        planes = x.reshape(len(x), -1, 1, x.shape[-1]).permute(0, 3, 1, 2)
+        planes = functional.group_norm(planes, 1, self.weight, self.bias, self.epsilon)
+        return planes.permute(0, 2, 3, 1).reshape(x.shape)
+
+    def channels_first(self, x: Float[Tensor, "c b rows"]) -> Float[Tensor, "c b rows"]:
+        """Normalise with channels before the batch."""
+        count = x.shape[0] * x.shape[2]
+        # Two small sums are faster than one over two axes that do not lie together.
+        mean = x.sum(dim=2).sum(dim=0) / count
+        centred = x - mean[:, None]
+        variance = centred.square().sum(dim=2).sum(dim=0) / count
+        scale = self.weight[:, None] * torch.rsqrt(variance + self.epsilon)
+        return torch.addcmul(self.bias[:, None, None], centred, scale[..., None])
+
+
+class BatchNorm(nn.Module):
+    """Batch normalisation over every axis but the channels (Ioffe, Szegedy 2015)."""
+
+    mean: Tensor
+    variance: Tensor
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.ones(channels))
+        self.bias = nn.Parameter(torch.zeros(channels))
+        self.register_buffer("mean", torch.zeros(channels))
+        self.register_buffer("variance", torch.ones(channels))
+        self.momentum = 0.1
+        self.epsilon = 1e-5
+
+    def forward(self, x: Float[Tensor, "b *rows c"]) -> Float[Tensor, "b *rows c"]:
+        """Normalise with channels last."""
+        planes = self._normalise(x.reshape(1, -1, 1, x.shape[-1]).permute(0, 3, 1, 2))
+        return planes.permute(0, 2, 3, 1).reshape(x.shape)
+
+    def channels_first(self, x: Float[Tensor, "c b rows"]) -> Float[Tensor, "c b rows"]:
+        """Normalise with channels before the batch."""
+        return self._normalise(x.reshape(1, len(x), -1)).reshape(x.shape)
+
+    def _normalise(self, x: Float[Tensor, "1 c *rows"]) -> Float[Tensor, "1 c *rows"]:
+        return functional.batch_norm(
+            x,
+            self.mean,
+            self.variance,
+            self.weight,
+            self.bias,
+            self.training,
+            self.momentum,
+            self.epsilon,
+        )
+
+
+def make_norm(kind: Norm, channels: int) -> GroupNorm | BatchNorm:
+    """Return a new normalisation of `kind`."""
+    return GroupNorm(channels) if kind == "group" else BatchNorm(channels)
+
+
+class PointwiseLayer(nn.Module):
+    """Linear, norm and ReLU applied to every row alone, with few channels, which lie first."""
+
+    def __init__(self, inputs: int, outputs: int, norm: Norm) -> None:
+        super().__init__()
+        self.linear = nn.Linear(inputs, outputs)
+        self.norm = make_norm(norm, outputs)
+
+    def forward(self, x: Float[Tensor, "c_in b rows"]) -> Float[Tensor, "c_out b rows"]:
+        """Map the channels of each row."""
+        _, batch, rows = x.shape
+        linear = self.linear
+        x = torch.addmm(linear.bias[:, None], linear.weight, x.reshape(len(x), -1))
+        return functional.relu_(self.norm.channels_first(x.view(-1, batch, rows)))
+
+
+def pointwise_net(widths: tuple[int, ...], norm: Norm) -> nn.Sequential:
+    """Return WeightNet or DensityNet of PointConv: ReLU at each layer, the last one included."""
+    return nn.Sequential(*(PointwiseLayer(a, b, norm) for a, b in pairwise(widths)))
+
+
+class SetAbstraction(nn.Module):
+    """One level: gather neighbours, weigh their features by place and density, and sum.
+
+    Args:
+        features: Channels of a point that comes in, its coordinates aside.
+        channels: Channels of a centroid that goes out.
+        norm: Normalisation of every layer.
+    """
+
+    weights_per_channel = 16
+
+    def __init__(self, features: int, channels: int, norm: Norm) -> None:
+        super().__init__()
+        self.point_linear = nn.Linear(3 + features, channels)
+        self.point_norm = make_norm(norm, channels)
+        self.weight_net = pointwise_net((3, 8, 8, self.weights_per_channel), norm)
+        self.density_net = pointwise_net((1, 16, 8, 1), norm)
+        self.output_linear = nn.Linear(self.weights_per_channel * channels, channels)
+        self.output_norm = make_norm(norm, channels)
+
+    def forward(
+        self,
+        points: Float[Tensor, "b n 3"],
+        features: Float[Tensor, "b n d"],
+        inverse_density: Float[Tensor, "b n"],
+        neighbours: Integer[Tensor, "b s k"] | None,
+    ) -> Float[Tensor, "b s_out c"]:
+        """Return the features of the centroids.
+
+        Args:
+            points: Coordinates; the first ones are the centroids.
+            features: What is known of each point.
+            inverse_density: One over the density at each point.
+            neighbours: Rows that each centroid gathers; None gathers all points about their
+                mean, into a single centroid.
+        """
+        linear = self.point_linear
+        hidden = functional.linear(
+            torch.cat([points, features], dim=-1), linear.weight, linear.bias
+        )
+        if neighbours is None:
+            centroids = points.mean(dim=1, keepdim=True)
+            hidden, offsets = hidden[:, None], points[:, None]
+            scale = inverse_density[:, None]
+        else:
+            centroids = points[:, : neighbours.shape[1]]
+            rows = _flat_rows(neighbours, points.shape[1])
+            hidden, offsets = _gather(hidden, rows), _gather(points, rows)
+            scale = _gather(inverse_density[..., None], rows)[..., 0]
+        # The first layer saw absolute coordinates; its part of the centroid comes off again.
+        hidden = hidden - functional.linear(centroids, linear.weight[:, :3])[:, :, None]
+        offsets = offsets - centroids[:, :, None]
+        scale = scale / scale.amax(dim=2, keepdim=True)
+
+        hidden = functional.relu_(self.point_norm(hidden))
+        batch, groups, size, channels = hidden.shape
+        weights = self.weight_net(offsets.permute(3, 0, 1, 2).reshape(3, batch, -1))
+        weights = weights * self.density_net(scale.reshape(1, batch, -1))
+        weights = weights.view(-1, batch * groups, size).permute(1, 2, 0)
+        hidden = hidden.view(batch * groups, size, channels).transpose(1, 2)
+        summed = torch.bmm(hidden, weights).view(batch, groups, -1)
+        return functional.relu_(self.output_norm(self.output_linear(summed)))
+
+
+def _flat_rows(neighbours: Integer[Tensor, "b s k"], points: int) -> Integer[Tensor, "b s k"]:
+    """Return rows of the whole batch laid end to end, for one flat gather."""
+    first = torch.arange(len(neighbours), device=neighbours.device) * points
+    return neighbours.long() + first[:, None, None]
+
+
+def _gather(
+    values: Float[Tensor, "b n c"], rows: Integer[Tensor, "b s k"]
+) -> Float[Tensor, "b s k c"]:
+    channels = values.shape[-1]
+    gathered = values.reshape(-1, channels).index_select(0, rows.reshape(-1))
+    return gathered.view(*rows.shape, channels)

@@ -1,0 +1,1 @@
+"""Driving an object to a goal shape in a closed loop."""

@@ -1,0 +1,1 @@
+"""The laboratory: two da Vinci arms and a soft body in PyBullet."""

@@ -1,0 +1,93 @@
+"""Two arms around the table: where they stand, how they point at the object, their link frames."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dnet.geometry.pose import pose, rotation_x, rotation_z, transform
+from dnet.sim.psm import JOINT_NAMES, Psm
+from dnet.sim.psm_links import LINK_JOINTS
+from dnet.types import ARMS, Joints, Point, Pose, Transform
+
+HOME: Joints = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
+"""Joint positions to start a search from: the tool straight down, half inserted."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the arms stand, mirrored about the plane x = 0.
+
+    Chosen so that every point within 6 cm of the grasps is within limits and clear of the other
+    arm, the table and the camera stand.
+    """
+
+    distance: float = 0.12
+    """Of each remote centre of motion from the plane between the arms, in metres."""
+    height: float = 0.19
+    """Of each remote centre of motion above the table, in metres."""
+    tilt: float = 0.1745
+    """How far each arm leans outwards, in radians."""
+    grasp: tuple[float, float] = (0.045, 0.04)
+    """The point that each tool's fixed orientation aims at: distance from the plane between
+    the arms and height above the table, in metres."""
+
+    @cached_property
+    def arms(self) -> tuple[Psm, Psm]:
+        """The holding and the moving arm."""
+        return (Psm(self._base(-1.0)), Psm(self._base(1.0)))
+
+    def tool_pose(self, arm: int, tip: Point) -> Pose:
+        """Return the pose of a tool whose tip is at `tip`.
+
+        The orientation is the same wherever the tip is: the jaws point along the line from the
+        remote centre of motion to the nominal grasp, and open across it.
+        """
+        side = (-1.0, 1.0)[arm]
+        distance, height = self.grasp
+        base = self._base(side)
+        along = np.array([side * distance, 0.0, height]) - base[:3, 3]
+        along /= np.linalg.norm(along)
+        across = np.cross([0.0, side, 0.0], along)
+        across /= np.linalg.norm(across)
+        return pose(np.column_stack([across, np.cross(along, across), along]), tip)
+
+    def joints_at(self, arm: int, tip: Point, *, near: Joints = HOME) -> Joints:
+        """Return the joint positions of an arm whose tool tip is at `tip`.
+
+        Raises:
+            Unreachable: If the arm cannot reach it.
+        """
+        return self.arms[arm].inverse(self.tool_pose(arm, tip), near=near)
+
+    def _base(self, side: float) -> Pose:
+        turn = rotation_z(side * np.pi / 2) @ rotation_x(self.tilt)
+        return pose(turn, np.array([side * self.distance, 0.0, self.height]))
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """The link frames of both arms, as logs and viewers want them."""
+
+    placement: Placement
+
+    joint_names: tuple[str, ...] = JOINT_NAMES
+
+    def transforms(self, joints: tuple[Joints, Joints]) -> list[Transform]:
+        """Return every link of both arms in its parent, the bases in `world`.
+
+        A link's name is the arm's, a slash, and the link's name in the URDF.
+        """
+        found = []
+        for name, arm, positions in zip(ARMS, self.placement.arms, joints, strict=True):
+            found.append(transform("world", f"{name}/base_link", arm.base))
+            found += [
+                transform(f"{name}/{link.parent}", f"{name}/{link.child}", link.frame(positions))
+                for link in LINK_JOINTS
+            ]
+        return found
+
+    def tip(self, joints: Joints) -> Point:
+        """Return where the moving arm's jaws meet, in the world."""
+        tip: Point = self.placement.arms[1].forward(joints)[:3, 3]
+        return tip

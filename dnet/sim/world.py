@@ -1,0 +1,65 @@
+"""What a world must do: be set up, be moved by the arms, come to rest, and be looked at."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float64
+
+from dnet.geometry.camera import DepthImage
+from dnet.types import JointPath, Joints, Nodes, Point, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """How the object came to rest."""
+
+    settled: bool
+    """Whether the last block of steps moved no node by more than the tolerance."""
+    steps: int
+    """Simulation steps that it took."""
+    least_volume_ratio: float
+    """Smallest ratio of a tetrahedron's volume to its rest volume; below zero it is inverted."""
+
+
+class World(Protocol):
+    """A place where one arm holds an object and the other deforms it."""
+
+    def reset(self, scene: Scene) -> None:
+        """Set the object down at rest, held and grasped as the scene says.
+
+        Raises:
+            Unreachable: If an arm cannot reach its point.
+            EmptyGrasp: If nothing is between the jaws there.
+        """
+
+    def restore(self) -> None:
+        """Put the object back at rest and the arms where they grasped it; the clock goes on."""
+
+    @property
+    def time(self) -> float:
+        """Seconds of simulation since the reset."""
+
+    @property
+    def joints(self) -> tuple[Joints, Joints]:
+        """Joint positions of the holding and the moving arm."""
+
+    @property
+    def tip(self) -> Point:
+        """Where the moving arm's jaws meet, in the world."""
+
+    @property
+    def object_id(self) -> int:
+        """The object's number in the mask of a depth image."""
+
+    def nodes(self) -> Nodes:
+        """Return the mesh nodes, in metres, (n, 3)."""
+
+    def follow(self, path: JointPath, times: Float64[np.ndarray, "_"]) -> None:
+        """Drive the moving arm along a timed joint path; what it grasps goes with it."""
+
+    def settle(self) -> Settling:
+        """Let the object come to rest with the arms still."""
+
+    def look(self) -> DepthImage:
+        """Return what the depth camera sees."""

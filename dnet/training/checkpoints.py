@@ -1,0 +1,150 @@
+"""Trained networks on disk: safetensors for the weights, JSON for all else, never a pickle."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, get_args
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from dnet.errors import BadCheckpoint, DnetError
+from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.neighbourhoods import Size
+from dnet.nets.pointconv import Norm
+
+BEST = "best.safetensors"
+"""The file that stands for a run directory: the network with the smallest validation error."""
+
+_NETWORK = "DeformerNet"
+_HINT = "give a run directory or a .safetensors file of `dnet train`"
+
+
+def save(
+    path: Path,
+    weights: Mapping[str, Tensor],
+    config: DeformerNetConfig,
+    *,
+    metrics: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a network into the file `path`, whole or not at all.
+
+    The file alone is enough to load the network: its header says what the weights are of.
+
+    Args:
+        path: A `.safetensors` file, replaced if it exists.
+        weights: The network's `state_dict()`.
+        config: Of the network.
+        metrics: What is known of it, as JSON, for people.
+    """
+    header = {
+        "network": _NETWORK,
+        "config": json.dumps(asdict(config)),
+        "metrics": json.dumps(metrics or {}),
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in weights.items()}
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        save_file(tensors, beside, metadata=header)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def load(path: Path) -> DeformerNet:
+    """Return the network that `path` holds, on the CPU and ready to predict.
+
+    Args:
+        path: A run directory, whose best network is taken, or a `.safetensors` file.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+    """
+    file = _weights_file(path)
+    header, weights = _read(file)
+    if header.get("network") != _NETWORK:
+        found = header.get("network", "an unnamed network")
+        raise BadCheckpoint(file, f"holds {found}, not {_NETWORK}", _HINT)
+    model = DeformerNet(_config(file, header.get("config", "")))
+    _check_shapes(file, weights, model.state_dict())
+    model.load_state_dict(weights)
+    return model.eval()
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Return what was written as `metrics` when `path` was saved.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt.
+    """
+    file = _weights_file(path)
+    header, _ = _read(file)
+    try:
+        return dict(json.loads(header.get("metrics", "{}")))
+    except (ValueError, TypeError, RecursionError) as error:
+        raise BadCheckpoint(file, f"has unreadable metrics ({error})", "train it again") from error
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write `content` into the file `path`, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        beside.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _weights_file(path: Path) -> Path:
+    file = path / BEST if path.is_dir() else path
+    if not file.is_file():
+        raise BadCheckpoint(file, "does not exist", _HINT)
+    return file
+
+
+def _read(file: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
+    try:
+        with safe_open(file, framework="pt", device="cpu") as content:
+            header = content.metadata() or {}
+            return header, {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError, ValueError) as error:
+        raise BadCheckpoint(file, f"is not a whole safetensors file ({error})", _HINT) from error
+
+
+def _config(file: Path, text: str) -> DeformerNetConfig:
+    try:
+        fields = json.loads(text)
+        config = DeformerNetConfig(
+            size=fields["size"],
+            norm=fields["norm"],
+            points=int(fields["points"]),
+            coordinate_unit=float(fields["coordinate_unit"]),
+            motion_unit=float(fields["motion_unit"]),
+        )
+        known = config.size in get_args(Size) and config.norm in get_args(Norm)
+    except (KeyError, TypeError, ValueError, RecursionError, DnetError) as error:
+        raise BadCheckpoint(file, f"has an unreadable config ({error!r})", _HINT) from error
+    if not known:
+        raise BadCheckpoint(
+            file, f"is of size {config.size!r} and norm {config.norm!r}", "install a newer dnet"
+        )
+    return config
+
+
+def _check_shapes(file: Path, got: Mapping[str, Tensor], want: Mapping[str, Tensor]) -> None:
+    for name in [*want, *got]:
+        if name not in got:
+            raise BadCheckpoint(file, f"lacks the weights {name}", _HINT)
+        if name not in want:
+            raise BadCheckpoint(file, f"has unknown weights {name}", _HINT)
+        if got[name].shape != want[name].shape:
+            shapes = f"{tuple(got[name].shape)}, not {tuple(want[name].shape)}"
+            raise BadCheckpoint(file, f"has weights {name} of shape {shapes}", _HINT)
+        if not torch.isfinite(got[name]).all():
+            raise BadCheckpoint(file, f"has weights {name} that are not numbers", "train it again")

@@ -1,0 +1,101 @@
+"""How far predicted motions are from true ones, next to predicting no motion at all."""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Float32, Int64
+from torch import Tensor
+
+from dnet.nets.deformernet import DeformerNet
+from dnet.training.batches import ordered_pairs
+from dnet.training.frames import Frames
+
+_CLOUDS, _PAIRS = 32, 65536
+# Encoded and compared at once: what keeps the memory of a validation below that of training.
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Errors over a set of pairs."""
+
+    pairs: int
+    mse_mm2: float
+    """Squared error, mean over pairs and over x, y, z, in square millimetres."""
+    mean_mm: float
+    """Mean Euclidean error in millimetres."""
+    r2: float
+    """Share of the variance of the motions that is explained."""
+    zero_mse_mm2: float
+    """`mse_mm2` of predicting no motion."""
+    zero_mean_mm: float
+    """`mean_mm` of predicting no motion: the mean length of a motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Scores of a network on a set of frames."""
+
+    any_pair: Scores
+    """Over all ordered pairs of frames of one episode: what a servo loop meets."""
+    from_rest: Scores | None
+    """From the rest shape to every other: its first step; None without a rest frame."""
+
+
+def score(predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> Scores:
+    """Return the errors of `predicted` motions, both in metres."""
+    predicted_mm, true_mm = predicted.double() * 1000, true.double() * 1000
+    error = predicted_mm - true_mm
+    variance = (true_mm - true_mm.mean(dim=0)).square().sum()
+    return Scores(
+        pairs=len(true),
+        mse_mm2=float(error.square().mean()),
+        mean_mm=float(error.norm(dim=1).mean()),
+        r2=float(1 - error.square().sum() / variance),
+        zero_mse_mm2=float(true_mm.square().mean()),
+        zero_mean_mm=float(true_mm.norm(dim=1).mean()),
+    )
+
+
+def errors_of(model: DeformerNet, frames: Frames) -> Errors:
+    """Return the errors of `model` on `frames`, which lie on its device."""
+    was_training = model.training
+    model.eval()
+    try:
+        with torch.no_grad():
+            current, goal = _pairs(frames)
+            predicted = _predict(model, frames, current, goal)
+    finally:
+        model.train(was_training)
+    true = frames.grasps[goal] - frames.grasps[current]
+    from_rest = frames.rest[current]
+    return Errors(
+        score(predicted, true),
+        score(predicted[from_rest], true[from_rest]) if from_rest.any() else None,
+    )
+
+
+def _pairs(frames: Frames) -> tuple[Int64[Tensor, " p"], Int64[Tensor, " p"]]:
+    device = frames.grasps.device
+    current, goal = [], []
+    for rows in frames.episodes:
+        one, other = ordered_pairs(len(rows))
+        current.append(torch.from_numpy(one) + rows.start)
+        goal.append(torch.from_numpy(other) + rows.start)
+    return torch.cat(current).to(device), torch.cat(goal).to(device)
+
+
+def _predict(
+    model: DeformerNet, frames: Frames, current: Int64[Tensor, " p"], goal: Int64[Tensor, " p"]
+) -> Float32[Tensor, "p 3"]:
+    rows = torch.arange(len(frames.clouds), device=current.device)
+    features = torch.cat(
+        [model.encode(frames.clouds.take(part)) for part in torch.split(rows, _CLOUDS)]
+    )
+    return torch.cat(
+        [
+            model.motion(features[one], features[other])
+            for one, other in zip(
+                torch.split(current, _PAIRS), torch.split(goal, _PAIRS), strict=True
+            )
+        ]
+    )

@@ -1,0 +1,162 @@
+"""The values that flow between the parts of dnet: frames, episodes, samples, plans, traces.
+
+Metres, seconds, radians and the world frame, unless a name says otherwise. The world's origin
+lies on the table top under the nominal centre of the object, z up; the holding arm stands on the
+-x side, the moving arm on the +x side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Float32, Float64
+
+Cloud = Float32[np.ndarray, "_ 3"]
+Nodes = Float32[np.ndarray, "_ 3"]
+Point = Float64[np.ndarray, "3"]
+Pose = Float64[np.ndarray, "4 4"]
+Joints = Float64[np.ndarray, "6"]
+JointPath = Float64[np.ndarray, "_ 6"]
+
+FrameKind = Literal["rest", "shape", "way"]
+"""`rest`: after the grasp, before any motion; `shape`: settled; `way`: seen on the way."""
+
+ARMS = ("psm_left", "psm_right")
+"""The two patient-side manipulators: the first holds the object, the second deforms it."""
+
+
+class Transform(NamedTuple):
+    """Where one named frame stands in another, as a scene graph stores it."""
+
+    parent: str
+    child: str
+    translation: Point
+    rotation: Float64[np.ndarray, "4"]
+    """Unit quaternion, x y z w."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One initial configuration and manipulation point: what an episode starts from."""
+
+    position: tuple[float, float]
+    """Where the centre of the object lies on the table (x, y)."""
+    yaw: float
+    """How far the object is turned about the vertical."""
+    hold: tuple[float, float, float]
+    """The point that the holding arm grips."""
+    manipulation_point: tuple[float, float, float]
+    """The point that the moving arm grasps and displaces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What was seen, and where the arms and the grasp were, at one instant."""
+
+    time: float
+    """Seconds of simulation since the episode began."""
+    kind: FrameKind
+    cloud: Cloud
+    """Visible surface of the object, in farthest-point order, (n, 3)."""
+    grasp: Point
+    """The manipulation point: the tip of the moving arm's jaws, (3,)."""
+    joints: tuple[Joints, Joints]
+    """Joint positions of the holding and the moving arm, in the order of `ARMS`."""
+    nodes: Nodes
+    """Mesh nodes of the simulator: ground truth for scores, never for a network, (m, 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeMeta:
+    """What is known of an episode before its first frame."""
+
+    episode_id: str
+    """Unique within a dataset, and the file's stem."""
+    seed: int
+    index: int
+    """Which pair of the recording this is."""
+    scene: Scene
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Everything that shaped the recording (object, camera, workspace, versions), as JSON."""
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One pair of initial configuration and manipulation point, and what was made of it."""
+
+    meta: EpisodeMeta
+    frames: Sequence[Frame]
+    """Frame 0 is the rest shape after the grasp."""
+    finished: bool
+    """Whether the recording ended by itself; a crash leaves this False."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Two frames of one episode and the motion of the grasp between them."""
+
+    current: Cloud
+    goal: Cloud
+    motion: Point
+    """Grasp of the goal frame minus grasp of the current one, (3,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """The shape to reach."""
+
+    cloud: Cloud
+    source: str
+    """Where it came from, for people: a file and a frame."""
+
+
+PlanStatus = Literal["straight", "rrt_connect", "partial", "failed"]
+"""`straight`: the straight line of the tip; `rrt_connect`: a planned detour that reaches the
+request; `partial`: a shorter motion than requested; `failed`: no motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A timed joint path of the moving arm, and how it came about."""
+
+    status: PlanStatus
+    path: JointPath
+    """Joint positions, (n, 6); a failed plan has the start alone."""
+    times: Float64[np.ndarray, "_"]
+    """Seconds from the start of the motion, (n,)."""
+    requested: Point
+    """Displacement of the tip that was asked for."""
+    achieved: Point
+    """Displacement of the tip at the end of the path."""
+    reason: str
+    """Why this plan and not a better one, empty for a straight line."""
+    checks: int
+    """Collision checks made."""
+    milliseconds: float
+    """Wall time of planning; the only figure here that differs from run to run."""
+
+
+Outcome = Literal["converged", "out_of_steps", "planning_failed", "interrupted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One turn of the servo loop: what was seen, and what was done about it."""
+
+    frame: Frame
+    chamfer: float
+    """Symmetric mean Chamfer distance from the cloud to the goal, in metres."""
+    motion: Point
+    """The motion that the controller asks for."""
+    plan: Plan | None = None
+    """What is done about it; None at the last observation of a run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A whole servo run."""
+
+    goal: Goal
+    steps: Sequence[Step]
+    outcome: Outcome
