@@ -2,26 +2,64 @@
 
 import os
 import sys
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Union
 
 import tyro
 
+from dnet.commands.demo import Demo
+from dnet.commands.inspect import Inspect
+from dnet.commands.play import Play
 from dnet.commands.record import Record
+from dnet.commands.servo import Servo
+from dnet.commands.train import Train
 from dnet.errors import DnetError
 
-Command = (
-    Annotated[Record, tyro.conf.subcommand("record")]
-    | Annotated[Record, tyro.conf.subcommand("record2")]
-)
+DESCRIPTION = """An open DeformerNet: simulate a da Vinci robot that deforms soft tissue, log it,
+learn from the logs, and drive the tissue to a goal shape.
+
+  dnet record data --pairs 4 --shapes 20
+  dnet train --from-mcap data --out run
+  dnet servo --checkpoint run --goal data/episode-0-00000.mcap --out servo
+  dnet play servo/run.rrd
+
+`dnet COMMAND --help` teaches each."""
+
+Command = Record | Train | Servo | Play | Inspect | Demo
+COMMANDS: dict[str, type[Command]] = {
+    "record": Record,
+    "train": Train,
+    "servo": Servo,
+    "play": Play,
+    "inspect": Inspect,
+    "demo": Demo,
+}
+
+
+def parse(arguments: Sequence[str]) -> Command:
+    """Return the command that the arguments name, with its options.
+
+    Where no command is named, each is described by its first line; its own help says the rest.
+    """
+    named = bool(arguments) and arguments[0] in COMMANDS
+
+    def described(name: str, command: type[Command]) -> object:
+        first_line = (command.__doc__ or "").split("\n")[0]
+        description = None if named else first_line
+        return Annotated[command, tyro.conf.subcommand(name, description=description)]
+
+    union = Union[tuple(described(*entry) for entry in COMMANDS.items())]  # noqa: UP007
+    chosen: Command = tyro.cli(union, prog="dnet", description=DESCRIPTION, args=arguments)
+    return chosen
 
 
 def main() -> None:
     """Run the command that the arguments name.
 
-    Exits with 0, with 1 and one line on stderr where dnet refuses, with 2 for arguments that it
-    cannot read, with 130 after Ctrl-C.
+    Exits with 0; with 1 and one line on stderr where dnet refuses; with 2 for arguments that it
+    cannot read; with 130 after Ctrl-C.
     """
-    command = tyro.cli(Command, prog="dnet", description=__doc__)
+    command = parse(sys.argv[1:])
     try:
         command.run()
     except DnetError as error:

@@ -36,7 +36,7 @@ class BadCloud(DnetError, ValueError):
 class TooFew(DnetError, ValueError):
     """A count below what makes sense."""
 
-    def __init__(self, what: str, got: float, least: float) -> None:
+    def __init__(self, what: str, got: int | float, least: int | float) -> None:
         super().__init__(f"{what} is {got}, must be at least {least}")
 
 
@@ -197,3 +197,17 @@ class ViewerFailed(DnetError, RuntimeError):
             f"the Rerun viewer ended with status {status}; its own message is above; "
             "--screenshot OUT.png draws without a screen"
         )
+
+
+class TooShort(DnetError, ValueError):
+    """A time that allows for nothing."""
+
+    def __init__(self, what: str, got: float) -> None:
+        super().__init__(f"{what} is {got}, must be above 0; leave it out for no limit")
+
+
+class NoDevice(DnetError, RuntimeError):
+    """A device to compute on that this machine lacks."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"device {name} is not there: torch finds no GPU; use --device cpu")

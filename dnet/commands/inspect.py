@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -21,19 +21,14 @@ class List:
 
     def run(self) -> None:
         """Print one row an episode and a line of sums."""
-        import polars as pl
-        from rich.console import Console
-
-        from dnet.commands.tables import print_table
-        from dnet.tools.listing import list_episodes
+        from dnet.tools.listing import list_episodes  # noqa: PLC0415
+        from dnet.tools.tables import print_table  # noqa: PLC0415
 
         episodes = list_episodes(self.directory)
-        console = Console()
-        noted = episodes["note"].is_in([""]).all()
-        print_table(console, episodes.drop("note") if noted else episodes)
-        finished = episodes.filter(pl.col("finished"))
-        console.print(
-            f"{finished.height} finished episodes of {episodes.height}, "
+        quiet = (episodes["note"] == "").all()
+        print_table(episodes.drop("note") if quiet else episodes)
+        print(  # noqa: T201
+            f"{episodes['finished'].sum()} of {episodes.height} episodes finished, "
             f"{episodes['shapes'].sum()} shapes, {episodes['MB'].sum():.1f} MB"
         )
 
@@ -53,16 +48,15 @@ class Info:
 
     def run(self) -> None:
         """Print the summary and the frames."""
-        from rich.console import Console
-
-        from dnet.commands.tables import print_table
-        from dnet.tools.listing import describe_episode
+        from dnet.tools.listing import describe_episode  # noqa: PLC0415
+        from dnet.tools.tables import print_table  # noqa: PLC0415
 
         description = describe_episode(self.file)
-        console = Console()
+        width = max(len(key) for key in description.summary)
         for key, value in description.summary.items():
-            console.print(f"{key:<28} {_text(value)}", markup=False, highlight=False)
-        print_table(console, description.frames)
+            text = f"{value:.6g}" if isinstance(value, float) else str(value)
+            print(f"{key:<{width}}  {text}")  # noqa: T201
+        print_table(description.frames)
 
 
 @dataclass(frozen=True)
@@ -73,14 +67,9 @@ class Inspect:
     """
 
     what: tyro.conf.OmitSubcommandPrefixes[
-        Annotated[List, tyro.conf.subcommand("ls")]
-        | Annotated[Info, tyro.conf.subcommand("info")]
+        Annotated[List, tyro.conf.subcommand("ls")] | Annotated[Info, tyro.conf.subcommand("info")]
     ]
 
     def run(self) -> None:
         """Print the table that was asked for."""
         self.what.run()
-
-
-def _text(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

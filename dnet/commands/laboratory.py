@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
@@ -58,8 +58,8 @@ def laboratory(points: int = POINTS) -> Iterator[Laboratory]:
     """Set up the laboratory with its default settings, and take it down at the end."""
     settings, workspace = BulletSettings(), Workspace()
     with (
-        BulletWorld(settings) as world,
-        Clearance(settings.placement, settings.camera) as clearance,
+        closing(BulletWorld(settings)) as world,
+        closing(Clearance(settings.placement, settings.camera)) as clearance,
     ):
         yield Laboratory(
             settings=settings,

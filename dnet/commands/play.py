@@ -29,8 +29,8 @@ class Play:
 
     def run(self) -> None:
         """Show the files."""
-        from dnet.datasets.reader import EpisodeReader
-        from dnet.recorders.playback import play
+        from dnet.datasets.reader import EpisodeReader  # noqa: PLC0415
+        from dnet.recorders.playback import play  # noqa: PLC0415
 
         play(
             self.files,

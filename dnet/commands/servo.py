@@ -24,8 +24,7 @@ class Servo:
     motion (straight line first, RRT-Connect around what blocks it) and is written to OUT/run.mcap
     and OUT/run.rrd: `dnet play OUT/run.rrd` shows the run.
 
-    Example: dnet servo --checkpoint runs/small --goal data/small/episode-0-00003.mcap:7
-    --out runs/servo
+    Example: dnet servo --checkpoint run --goal data/episode-0-00003.mcap:7 --out servo
     """
 
     checkpoint: Path

@@ -3,7 +3,6 @@
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
 
 import numpy as np
 from rich.console import Console
@@ -33,7 +32,7 @@ class ServoLog:
             RerunRun(out / RECORDING, name=meta.episode_id, arms=lab.arms, urdf=psm_urdf())
         )
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "ServoLog":
         return self
 
     def __exit__(

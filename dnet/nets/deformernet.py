@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from dnet.errors import BadCloud, LongCloud, ShortCloud, TooFew
 from dnet.nets.neighbourhoods import (
     GROUPINGS,
+    MOST_POINTS,
     Neighbourhoods,
     Size,
     find_neighbourhoods,
@@ -40,9 +41,9 @@ class DeformerNetConfig:
         first = GROUPINGS[self.size][0]
         least = max(first.centroids, first.neighbours)
         if self.points < least:
-            raise TooFew(
-                f"points of a cloud for a network of size {self.size!r}", self.points, least
-            )
+            raise TooFew(f"points of a cloud for a {self.size} network", self.points, least)
+        if self.points > MOST_POINTS:
+            raise LongCloud("cloud", self.points, MOST_POINTS)
 
 
 class Encoder(nn.Module):
@@ -58,12 +59,15 @@ class Encoder(nn.Module):
 
     def forward(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch."""
-        points, neighbours, scales = clouds.points, clouds.neighbours, clouds.inverse_densities
-        features = self.first(points, points, scales[0], neighbours[0])
+        points = clouds.points
+        scales, neighbours = clouds.inverse_densities, clouds.neighbours
+        features = self.first(points, points, inverse_density=scales[0], neighbours=neighbours[0])
         points = points[:, : features.shape[1]]
-        features = self.second(points, features, scales[1], neighbours[1])
+        features = self.second(
+            points, features, inverse_density=scales[1], neighbours=neighbours[1]
+        )
         points = points[:, : features.shape[1]]
-        whole: Tensor = self.third(points, features, scales[2], None)
+        whole: Tensor = self.third(points, features, inverse_density=scales[2], neighbours=None)
         return whole[:, 0]
 
 

@@ -35,6 +35,9 @@ GROUPINGS: dict[Size, tuple[Grouping, Grouping]] = {
 BANDWIDTHS = (0.1, 0.2, 0.4)
 """Of the density at each level, in the unit of the coordinates (PointConv, public code)."""
 
+MOST_POINTS = 2**15 - 1
+"""Of a cloud: its rows are kept as int16, so that tens of thousands of clouds fit in memory."""
+
 _ROWS = 128
 # Rows of the distance matrix held at once: 128 x 2048 floats stay in a processor's cache.
 

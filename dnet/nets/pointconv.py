@@ -131,6 +131,7 @@ class SetAbstraction(nn.Module):
         self,
         points: Float[Tensor, "b n 3"],
         features: Float[Tensor, "b n d"],
+        *,
         inverse_density: Float[Tensor, "b n"],
         neighbours: Integer[Tensor, "b s k"] | None,
     ) -> Float[Tensor, "b s_out c"]:
@@ -159,9 +160,17 @@ class SetAbstraction(nn.Module):
         # The first layer saw absolute coordinates; its part of the centroid comes off again.
         hidden = hidden - functional.linear(centroids, linear.weight[:, :3])[:, :, None]
         offsets = offsets - centroids[:, :, None]
-        scale = scale / scale.amax(dim=2, keepdim=True)
-
         hidden = functional.relu_(self.point_norm(hidden))
+        return self._convolve(hidden, offsets, scale=scale / scale.amax(dim=2, keepdim=True))
+
+    def _convolve(
+        self,
+        hidden: Float[Tensor, "b s k c"],
+        offsets: Float[Tensor, "b s k 3"],
+        *,
+        scale: Float[Tensor, "b s k"],
+    ) -> Float[Tensor, "b s c"]:
+        """Weigh each neighbour's features by where it lies and how crowded, and sum."""
         batch, groups, size, channels = hidden.shape
         weights = self.weight_net(offsets.permute(3, 0, 1, 2).reshape(3, batch, -1))
         weights = weights * self.density_net(scale.reshape(1, batch, -1))

@@ -1,7 +1,7 @@
 """What planning needs of an arm and of the space around it."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,6 +17,7 @@ Obstacle = Callable[[Joints], str | None]
 """What an arm would touch at joint positions, and with which link; None if it is clear."""
 
 
+@runtime_checkable
 class Arm(Protocol):
     """An arm of six joints with a solution to its inverse kinematics."""
 
@@ -47,6 +48,7 @@ class Arm(Protocol):
         """
 
 
+@runtime_checkable
 class Surroundings(Protocol):
     """What the moving arm must stay clear of."""
 

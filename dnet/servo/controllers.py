@@ -1,10 +1,11 @@
 """What decides the next motion of the gripper from the current and the goal cloud."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from dnet.types import Cloud, Point
 
 
+@runtime_checkable
 class Controller(Protocol):
     """Maps two clouds of one object to the motion that takes one shape to the other."""
 

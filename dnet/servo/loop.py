@@ -5,7 +5,7 @@ The loop of section II of the paper (Thach, Kuntz and Hermans, DeformerNet, 2021
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -16,6 +16,7 @@ from dnet.servo.controllers import Controller
 from dnet.types import Frame, Goal, JointPath, Joints, Outcome, Plan, Point, Step, Trace
 
 
+@runtime_checkable
 class Scene(Protocol):
     """The object and the arms, as far as the loop acts on them."""
 
@@ -26,6 +27,7 @@ class Scene(Protocol):
         """Let the object come to rest."""
 
 
+@runtime_checkable
 class Planner(Protocol):
     """Plans motions of the moving arm."""
 

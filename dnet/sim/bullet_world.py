@@ -1,8 +1,6 @@
 """The world in PyBullet: two kinematic arms, a soft box, a depth camera."""
 
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -13,6 +11,8 @@ from dnet.geometry.pose import inverse, rotation_z
 from dnet.sim.arms import Placement
 from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
+from dnet.sim.bullet_blocks import add_picture
+from dnet.sim.furniture import TABLE
 from dnet.sim.scenes import SoftBox
 from dnet.sim.soft_body import SoftBody
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices, box_mesh
@@ -60,17 +60,6 @@ class BulletWorld:
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._time = 0.0
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
     def close(self) -> None:
         """Stop the server."""
         if self._client >= 0:
@@ -111,6 +100,7 @@ class BulletWorld:
         self._gripped = np.setdiff1d(gripped, self._held)
         self._arms = BulletArms(client, place)
         self._arms.touch_nothing()
+        add_picture(TABLE, client)
         self._grasped = (hold, grasp)
         self._time = 0.0
         self.restore()

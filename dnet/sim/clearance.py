@@ -1,13 +1,11 @@
 """Collision checks for planning: the moving arm against all that stands around it."""
 
-from types import TracebackType
-from typing import Self
-
 from dnet.geometry.camera import Camera
 from dnet.sim.arms import Placement
 from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
-from dnet.sim.furniture import Block, furniture
+from dnet.sim.bullet_blocks import add_solid
+from dnet.sim.furniture import furniture
 from dnet.types import Joints
 
 MARGIN = 0.002
@@ -22,20 +20,9 @@ class Clearance:
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._margin = margin
         self._arms = BulletArms(self._client, placement)
-        self._others = {_body(block, self._client): block.name for block in furniture(camera)} | {
-            self._arms.bodies[0]: "the holding arm"
-        }
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+        self._others = {self._arms.bodies[0]: "the holding arm"}
+        for block in furniture(camera):
+            self._others[add_solid(block, self._client)] = f"the {block.name}"
 
     def close(self) -> None:
         """Stop the server."""
@@ -57,23 +44,3 @@ class Clearance:
             if close:
                 return f"{name} (with its {self._arms.links.get(close[0][3], 'base_link')})"
         return None
-
-
-def _body(block: Block, client: int) -> int:
-    if block.shape == "box":
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=[edge / 2 for edge in block.size],
-            physicsClientId=client,
-        )
-    else:
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_CYLINDER,
-            radius=block.size[0] / 2,
-            height=block.size[2],
-            physicsClientId=client,
-        )
-    body: int = pybullet.createMultiBody(
-        0, shape, basePosition=block.centre, physicsClientId=client
-    )
-    return body

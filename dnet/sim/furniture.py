@@ -5,8 +5,6 @@ from typing import Literal
 
 from dnet.geometry.camera import Camera
 
-TABLE = (0.60, 0.60, 0.04)
-"""Length, width and thickness in metres; its top is the plane z = 0."""
 STAND_RADIUS = 0.012
 CAMERA_SIZE = (0.08, 0.04, 0.04)
 
@@ -22,13 +20,17 @@ class Block:
     centre: tuple[float, float, float]
 
 
+TABLE = Block("table", "box", (0.60, 0.60, 0.04), (0.0, 0.0, -0.02))
+"""Its top is the plane z = 0."""
+
+
 def furniture(camera: Camera) -> tuple[Block, ...]:
     """Return the table, the camera, and the stand that carries it from behind."""
     x, y, z = camera.eye
     width = 2 * STAND_RADIUS
     behind = y - CAMERA_SIZE[1] / 2 - STAND_RADIUS
     return (
-        Block("table", "box", TABLE, (0.0, 0.0, -TABLE[2] / 2)),
+        TABLE,
         Block("camera", "box", CAMERA_SIZE, (x, y, z)),
         Block("camera stand", "cylinder", (width, width, z), (x, behind, z / 2)),
     )

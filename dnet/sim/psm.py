@@ -8,6 +8,7 @@ on -y.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import atan2, pi, sqrt
 from typing import Literal
 
@@ -20,7 +21,7 @@ from dnet.types import Joints, Pose
 HALF = pi / 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DHJoint:
     """One row of the table: Rx(alpha) Tx(a) Rz(theta) Tz(d), the joint about or along z."""
 
@@ -39,7 +40,7 @@ class DHJoint:
     acceleration: float
     """Limit in rad/s^2 or m/s^2."""
 
-    @property
+    @cached_property
     def origin(self) -> Pose:
         """The joint's frame in the frame before it, at position zero."""
         turn = rotation_x(self.alpha)
@@ -67,12 +68,14 @@ is out of the cannula, in metres."""
 
 # Wrist velocities: the console's file allows 18.8 rad/s; 3 rad/s is what tissue work needs.
 JOINTS: tuple[DHJoint, ...] = (
-    DHJoint("yaw", "revolute", HALF, 0, HALF, 0, -1.588, 1.588, 1.5708, 1.5708),
-    DHJoint("pitch", "revolute", -HALF, 0, -HALF, 0, -0.925025, 0.925025, 1.5708, 1.5708),
-    DHJoint("insertion", "prismatic", HALF, 0, 0, -RCM_OFFSET, 0.0, 0.24, 0.2, 0.2),
-    DHJoint("roll", "revolute", 0, 0, 0, TOOL_LENGTH, -4.53786, 4.53786, 3.0, 12.566),
-    DHJoint("wrist_pitch", "revolute", -HALF, 0, -HALF, 0, -1.39626, 1.39626, 3.0, 12.566),
-    DHJoint("wrist_yaw", "revolute", -HALF, WRIST_LENGTH, -HALF, 0, -1.39626, 1.39626, 3.0, 12.566),
+    DHJoint("yaw", "revolute", HALF, 0.0, HALF, 0.0, -1.588, 1.588, 1.5708, 1.5708),
+    DHJoint("pitch", "revolute", -HALF, 0.0, -HALF, 0.0, -0.925025, 0.925025, 1.5708, 1.5708),
+    DHJoint("insertion", "prismatic", HALF, 0.0, 0.0, -RCM_OFFSET, 0.0, 0.24, 0.2, 0.2),
+    DHJoint("roll", "revolute", 0.0, 0.0, 0.0, TOOL_LENGTH, -4.53786, 4.53786, 3.0, 12.566),
+    DHJoint("wrist_pitch", "revolute", -HALF, 0.0, -HALF, 0.0, -1.39626, 1.39626, 3.0, 12.566),
+    DHJoint(
+        "wrist_yaw", "revolute", -HALF, WRIST_LENGTH, -HALF, 0.0, -1.39626, 1.39626, 3.0, 12.566
+    ),
 )
 JOINT_NAMES = tuple(joint.name for joint in JOINTS)
 LOWER = np.array([joint.lower for joint in JOINTS])

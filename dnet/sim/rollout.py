@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ PATIENCE = 100
 """Rejected draws in a row after which the settings must be at fault."""
 
 
+@runtime_checkable
 class Planner(Protocol):
     """Plans motions of the moving arm."""
 

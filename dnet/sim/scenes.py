@@ -33,14 +33,14 @@ class Workspace:
     """Largest offset of the object from the origin along x and along y, in metres."""
     yaw: float = 0.2
     """Largest turn of the object about the vertical, in radians."""
-    grasp_low: tuple[float, float] = (0.010, -0.040)
+    grasp_low: tuple[float, float] = (0.020, -0.040)
     """Least manipulation point on the object's top face (x, y in its own frame), in metres."""
     grasp_high: tuple[float, float] = (0.045, 0.040)
     """Greatest manipulation point, likewise."""
-    displacement_low: tuple[float, float, float] = (-0.03, -0.06, 0.0)
+    displacement_low: tuple[float, float, float] = (-0.03, -0.05, 0.0)
     """Least displacement of the gripper from the manipulation point, in metres: pushing inwards
     by more than 3 cm, or down, turns tetrahedra inside out."""
-    displacement_high: tuple[float, float, float] = (0.06, 0.06, 0.06)
+    displacement_high: tuple[float, float, float] = (0.05, 0.05, 0.05)
     """Greatest displacement of the gripper, in metres."""
     hold: float = 0.005
     """How far from the object's end the holding arm grips its top face, in metres."""

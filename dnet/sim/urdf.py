@@ -48,29 +48,29 @@ def psm_urdf(name: str = "psm") -> str:
 
 
 def _add_links(robot: ElementTree.Element) -> None:
-    link = _link(robot, "base_link", 2.0, (0.1, 0.1, 0.1), (0, -0.62, 0))
-    _box(link, "dark", (0.12, 0.12, 0.16), (0, -0.66, 0))
-    _box(link, "dark", (0.10, 0.10, 0.50), (0, -0.70, -0.25), solid=False)
+    link = _link(robot, "base_link", 2.0, (0.1, 0.1, 0.1), (0.0, -0.62, 0.0))
+    _box(link, "dark", (0.12, 0.12, 0.16), (0.0, -0.66, 0.0))
+    _box(link, "dark", (0.10, 0.10, 0.50), (0.0, -0.70, -0.25), solid=False)
 
-    link = _link(robot, "yaw_link", 1.47, (0.1, 0.1, 0.16), (0, 0, 0.55))
-    _box(link, "blue", (0.10, 0.10, 0.14), (0, 0, PIVOT_DISTANCE))
+    link = _link(robot, "yaw_link", 1.47, (0.1, 0.1, 0.16), (0.0, 0.0, 0.55))
+    _box(link, "blue", (0.10, 0.10, 0.14), (0.0, 0.0, PIVOT_DISTANCE))
 
     rail = PARALLELOGRAM_OFFSET + 0.02
-    link = _link(robot, "pitch_link", 0.40, (0.05, 0.5, 0.05), (0.04, 0.36, 0))
+    link = _link(robot, "pitch_link", 0.40, (0.05, 0.5, 0.05), (0.04, 0.36, 0.0))
     lower = PARALLELOGRAM_HEIGHT - 0.02
-    _bar(link, "shell", (rail, lower, 0), (rail, lower + 0.48, 0), section=(0.05, 0.045))
+    _bar(link, "shell", (rail, lower, 0.0), (rail, lower + 0.48, 0.0), section=(0.05, 0.045))
 
-    link = _link(robot, "insertion_link", 0.58, (0.06, 0.06, 0.08), (0, 0, 0))
-    _box(link, "dark", (0.045, 0.06, 0.08), (0, 0, -0.02))
+    link = _link(robot, "insertion_link", 0.58, (0.06, 0.06, 0.08), (0.0, 0.0, 0.0))
+    _box(link, "dark", (0.045, 0.06, 0.08), (0.0, 0.0, -0.02))
 
-    link = _link(robot, "roll_link", 0.02, (0.01, 0.01, TOOL_LENGTH), (0, 0, -TOOL_LENGTH / 2))
-    _rod(link, "steel", (0, 0, -TOOL_LENGTH + 0.005), (0, 0, -0.005), SHAFT_RADIUS)
+    link = _link(robot, "roll_link", 0.02, (0.01, 0.01, TOOL_LENGTH), (0.0, 0.0, -TOOL_LENGTH / 2))
+    _rod(link, "steel", (0.0, 0.0, -TOOL_LENGTH + 0.005), (0.0, 0.0, -0.005), SHAFT_RADIUS)
 
-    link = _link(robot, "wrist_pitch_link", 0.0125, (0.01, 0.008, 0.008), (0.0045, 0, 0))
-    _rod(link, "steel", (0, 0, 0), (WRIST_LENGTH, 0, 0), 0.0038)
+    link = _link(robot, "wrist_pitch_link", 0.0125, (0.01, 0.008, 0.008), (0.0045, 0.0, 0.0))
+    _rod(link, "steel", (0.0, 0.0, 0.0), (WRIST_LENGTH, 0.0, 0.0), 0.0038)
 
-    link = _link(robot, "wrist_yaw_link", 0.0125, (0.01, 0.008, 0.008), (0, 0, 0))
-    _rod(link, "steel", (0, 0, -0.003), (0, 0, 0.003), 0.0035)
+    link = _link(robot, "wrist_yaw_link", 0.0125, (0.01, 0.008, 0.008), (0.0, 0.0, 0.0))
+    _rod(link, "steel", (0.0, 0.0, -0.003), (0.0, 0.0, 0.003), 0.0035)
 
     along = TIP[:3, 2]
     for side, turned in (("left", along), ("right", along * np.array([1.0, -1.0, -1.0]))):
@@ -78,13 +78,19 @@ def _add_links(robot: ElementTree.Element) -> None:
         link = _link(robot, f"jaw_{side}_link", 0.0105, (0.004, 0.004, JAW_LENGTH), middle)
         ends = _triple(turned * 0.001), _triple(turned * JAW_LENGTH)
         _bar(link, "steel", *ends, section=(0.003, 0.003))
-    _link(robot, "tip_link", 1e-4, (0.002, 0.002, 0.002), (0, 0, 0))
+    _link(robot, "tip_link", 1e-4, (0.002, 0.002, 0.002), (0.0, 0.0, 0.0))
 
-    link = _link(robot, "back_link", 0.70, (0.04, 0.15, 0.03), (0.02, 0.075, 0))
-    _bar(link, "shell", (0, 0, 0), (BACK_OFFSET, PARALLELOGRAM_HEIGHT, 0), section=(0.03, 0.04))
-    link = _link(robot, "bar_link", 0.446, (0.5, 0.03, 0.03), (-0.26, 0, 0))
+    link = _link(robot, "back_link", 0.70, (0.04, 0.15, 0.03), (0.02, 0.075, 0.0))
+    _bar(
+        link,
+        "shell",
+        (0.0, 0.0, 0.0),
+        (BACK_OFFSET, PARALLELOGRAM_HEIGHT, 0.0),
+        section=(0.03, 0.04),
+    )
+    link = _link(robot, "bar_link", 0.446, (0.5, 0.03, 0.03), (-0.26, 0.0, 0.0))
     reach = PIVOT_DISTANCE + BACK_OFFSET - PARALLELOGRAM_OFFSET
-    _bar(link, "shell", (0, 0, 0), (-reach, 0, 0), section=(0.03, 0.04))
+    _bar(link, "shell", (0.0, 0.0, 0.0), (-reach, 0.0, 0.0), section=(0.03, 0.04))
 
 
 def _add_joint(robot: ElementTree.Element, joint: LinkJoint) -> None:

@@ -1,7 +1,7 @@
 """What a world must do: be set up, be moved by the arms, come to rest, and be looked at."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -22,6 +22,7 @@ class Settling:
     """Smallest ratio of a tetrahedron's volume to its rest volume; below zero it is inverted."""
 
 
+@runtime_checkable
 class World(Protocol):
     """A place where one arm holds an object and the other deforms it."""
 

@@ -57,8 +57,8 @@ class Augmentation:
 def place(
     clouds: Neighbourhoods,
     placement: Placement,
-    groups: Int64[Tensor, " b"],
     *,
+    groups: Int64[Tensor, " b"],
     coordinate_unit: float,
 ) -> Neighbourhoods:
     """Return `clouds`, each placed as its group is.
@@ -75,7 +75,7 @@ def place(
 
 
 def turn(
-    motions: Float32[Tensor, "p 3"], placement: Placement, groups: Int64[Tensor, " p"]
+    motions: Float32[Tensor, "p 3"], placement: Placement, *, groups: Int64[Tensor, " p"]
 ) -> Float32[Tensor, "p 3"]:
     """Return `motions` of the grasp, each turned as its group is; a shift leaves them."""
     return torch.bmm(placement.turns[groups], motions[..., None])[..., 0]

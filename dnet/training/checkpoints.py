@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as save_tensors
 from torch import Tensor
 
 from dnet.errors import BadCheckpoint, DnetError
@@ -27,8 +27,8 @@ _HINT = "give a run directory or a .safetensors file of `dnet train`"
 def save(
     path: Path,
     weights: Mapping[str, Tensor],
-    config: DeformerNetConfig,
     *,
+    config: DeformerNetConfig,
     metrics: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a network into the file `path`, whole or not at all.
@@ -50,7 +50,7 @@ def save(
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in weights.items()}
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        save_file(tensors, beside, metadata=header)
+        beside.write_bytes(save_tensors(tensors, metadata=header))
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)

@@ -7,13 +7,14 @@ from typing import Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float32, Float64
+from jaxtyping import Bool, Float32, Int64
 from torch import Tensor
 
 from dnet.errors import BadEpisode, TooFew
 from dnet.nets.deformernet import DeformerNetConfig, prepare
 from dnet.nets.neighbourhoods import Neighbourhoods, stack
-from dnet.types import Cloud, FrameKind, Point
+from dnet.training.batches import ordered_pairs
+from dnet.types import Frame, FrameKind, Point
 
 SETTLED: tuple[FrameKind, ...] = ("rest", "shape")
 """Kinds of frame that pairs are made of; what is seen on the way is still moving."""
@@ -32,13 +33,8 @@ class EpisodeSource(Protocol):
         """What each frame is."""
         ...
 
-    @property
-    def grasps(self) -> Float64[np.ndarray, "_ 3"]:
-        """The manipulation point at each frame, (n, 3)."""
-        ...
-
-    def cloud(self, index: int) -> Cloud:
-        """Return the visible surface at frame `index`, in farthest-point order."""
+    def frame(self, index: int) -> Frame:
+        """Return all of frame `index`."""
         ...
 
 
@@ -67,6 +63,22 @@ class Frames:
         return tuple(
             range(end - length, end) for end, length in zip(ends, self.lengths, strict=True)
         )
+
+    def all_pairs(self) -> tuple[Int64[Tensor, " p"], Int64[Tensor, " p"]]:
+        """Return the rows of the current and of the goal frame of every ordered pair."""
+        device = self.grasps.device
+        current, goal = [], []
+        for rows in self.episodes:
+            one, other = ordered_pairs(len(rows))
+            current.append(torch.from_numpy(one) + rows.start)
+            goal.append(torch.from_numpy(other) + rows.start)
+        return torch.cat(current).to(device), torch.cat(goal).to(device)
+
+    def motions(
+        self, current: Int64[Tensor, " p"], goal: Int64[Tensor, " p"]
+    ) -> Float32[Tensor, "p 3"]:
+        """Return the motion of the grasp between frames of these rows, in metres."""
+        return self.grasps[goal] - self.grasps[current]
 
     def to(self, device: torch.device) -> "Frames":
         """Return the same frames on `device`."""
@@ -109,9 +121,12 @@ def read_frames(
         if len(chosen) < 2:
             continue
         for index in chosen:
-            clouds.append(_prepare(episode, index, config))
-            grasps.append(episode.grasps[index])
-            rest.append(episode.kinds[index] == "rest")
+            frame = episode.frame(index)
+            where = f"frame {index} of {episode.path}"
+            _check_points(frame, config, path=episode.path)
+            clouds.append(prepare(frame.cloud, config, what=where))
+            grasps.append(frame.grasp)
+            rest.append(frame.kind == "rest")
             on_cloud()
         lengths.append(len(chosen))
     if not lengths:
@@ -124,12 +139,10 @@ def read_frames(
     )
 
 
-def _prepare(episode: EpisodeSource, index: int, config: DeformerNetConfig) -> Neighbourhoods:
-    cloud = episode.cloud(index)
-    if len(cloud) != config.points:
+def _check_points(frame: Frame, config: DeformerNetConfig, *, path: Path) -> None:
+    if len(frame.cloud) != config.points:
         raise BadEpisode(
-            episode.path,
-            f"has a cloud of {len(cloud)} points at frame {index}, not {config.points}",
+            path,
+            f"has clouds of {len(frame.cloud)} points, the first episode's have {config.points}",
             "train on episodes that were recorded with one number of points",
         )
-    return prepare(cloud, config, what=f"frame {index} of {episode.path}")

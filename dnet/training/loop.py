@@ -84,6 +84,8 @@ class EpochDone:
     learning_rate: float
     seconds: float
     """Since the training began."""
+    progress: float
+    """Share of the whole training that is done, from 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,7 @@ class Result:
     last: Weights
     history: tuple[EpochDone, ...]
     interrupted: bool
-    """Whether someone stopped it, or its time was up, before the last epoch."""
+    """Whether someone stopped it."""
 
 
 def new_network(config: DeformerNetConfig, *, seed: int) -> DeformerNet:
@@ -106,10 +108,10 @@ def new_network(config: DeformerNetConfig, *, seed: int) -> DeformerNet:
 
 
 def learning_rate_at(settings: TrainingSettings, progress: float) -> float:
-    """Return the learning rate after `progress` epochs, a whole number or not."""
+    """Return the learning rate when `progress` of the training is done, from 0 to 1."""
     if settings.schedule == "step":
-        return settings.learning_rate * 0.1 ** (int(progress) // 50)
-    return settings.learning_rate * (1 + math.cos(math.pi * progress / settings.epochs)) / 2
+        return settings.learning_rate * 0.1 ** (int(progress * settings.epochs + 1e-9) // 50)
+    return settings.learning_rate * (1 + math.cos(math.pi * progress)) / 2
 
 
 def _ignore(event: StepDone | EpochDone) -> None:
@@ -119,63 +121,90 @@ def _ignore(event: StepDone | EpochDone) -> None:
 def fit(
     model: DeformerNet,
     training: Frames,
+    *,
     validation: Frames,
     settings: TrainingSettings,
-    *,
     on_event: Callable[[StepDone | EpochDone], None] = _ignore,
     seconds: float = math.inf,
 ) -> Result:
     """Train `model` in place and return the best and the last of its weights.
 
-    On one machine's CPU, the same arguments give the same weights. A KeyboardInterrupt ends the
-    training after the last whole epoch; the weights up to there are returned. So does `seconds`.
+    On one machine's CPU, the same arguments give the same weights, as long as `seconds` is left
+    alone. A KeyboardInterrupt after the first epoch ends the training; what the whole epochs
+    up to there have left is returned.
 
     Args:
         model: On the device of the frames.
         training: What to learn from.
         validation: What the best epoch is chosen by.
         settings: How.
-        on_event: Told of every batch and every epoch.
-        seconds: Time after which no further epoch begins.
+        on_event: Told of every batch and every epoch, at whose end the weights are in `model`.
+        seconds: Time that training may take; the schedule then follows the clock wherever that
+            is ahead of the epochs, so that the learning rate still comes down.
     """
-    optimizer = torch.optim.Adam(model.parameters())
+    optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate, fused=True)
+    clock = _Clock(settings.epochs, seconds, time.monotonic())
     history: list[EpochDone] = []
     best = last = _weights(model)
-    began = time.monotonic()
+    interrupted = False
     try:
-        for epoch in range(settings.epochs):
-            if time.monotonic() - began > seconds:
-                break
-            loss = _epoch(model, optimizer, training, settings, epoch=epoch, on_event=on_event)
+        while not history or clock.progress(len(history)) < 1:
+            epoch = len(history)
+            loss = _epoch(
+                model,
+                optimizer,
+                training=training,
+                settings=settings,
+                clock=clock,
+                epoch=epoch,
+                on_event=on_event,
+            )
             errors = errors_of(model, validation)
             least = min((done.validation.any_pair.mse_mm2 for done in history), default=math.inf)
             done = EpochDone(
                 epoch=epoch + 1,
                 loss_mm2=loss,
                 validation=errors,
-                best=errors.any_pair.mse_mm2 < least,
+                best=errors.any_pair.mse_mm2 < least or not history,
                 learning_rate=optimizer.param_groups[0]["lr"],
-                seconds=time.monotonic() - began,
+                seconds=time.monotonic() - clock.began,
+                progress=clock.progress(epoch + 1),
             )
             history.append(done)
             last = _weights(model)
             best = last if done.best else best
             on_event(done)
     except KeyboardInterrupt:
-        # A batch may be half applied: what counts is the last whole epoch.
-        pass
-    return Result(best, last, tuple(history), interrupted=len(history) < settings.epochs)
+        if not history:
+            raise
+        interrupted = True
+    return Result(best, last, tuple(history), interrupted)
+
+
+@dataclass(frozen=True, slots=True)
+class _Clock:
+    """How much of a training is done, by its epochs or by its time."""
+
+    epochs: int
+    seconds: float
+    began: float
+
+    def progress(self, epochs_done: float) -> float:
+        elapsed = time.monotonic() - self.began
+        return min(1.0, max(epochs_done / self.epochs, elapsed / self.seconds))
 
 
 def _epoch(
     model: DeformerNet,
     optimizer: torch.optim.Optimizer,
+    *,
     training: Frames,
     settings: TrainingSettings,
-    *,
+    clock: _Clock,
     epoch: int,
     on_event: Callable[[StepDone | EpochDone], None],
 ) -> float:
+    """Learn from every batch once and return the mean loss; stop early when time is up."""
     model.train()
     batches = all_pairs(
         training.lengths,
@@ -184,29 +213,34 @@ def _epoch(
         groups=settings.groups,
         frames=settings.frames,
     )
+    # Apart from the order of batches, which is drawn from (seed, epoch).
     rng = np.random.default_rng((settings.seed, epoch, 1))
     unit = model.config.motion_unit
-    total = 0.0
+    losses: list[float] = []
     for step, batch in enumerate(batches):
-        rate = learning_rate_at(settings, epoch + step / len(batches))
+        progress = clock.progress(epoch + step / len(batches))
+        if progress >= 1 and losses:
+            break
         for group in optimizer.param_groups:
-            group["lr"] = rate
+            group["lr"] = learning_rate_at(settings, progress)
         optimizer.zero_grad(set_to_none=True)
-        predicted, true = _motions(model, training, batch, settings.augmentation, rng)
+        predicted, true = _motions(
+            model, training, batch=batch, augmentation=settings.augmentation, rng=rng
+        )
         # In the network's unit, errors and so gradients are near 1.
         loss = functional.mse_loss(predicted / unit, true / unit)
         torch.autograd.backward(loss)
         torch.nn.utils.clip_grad_norm_(model.parameters(), settings.gradient_limit)
         optimizer.step()
-        loss_mm2 = loss.item() * (unit * 1000) ** 2
-        total += loss_mm2
-        on_event(StepDone(epoch + 1, step + 1, len(batches), loss_mm2))
-    return total / len(batches)
+        losses.append(loss.item() * (unit * 1000) ** 2)
+        on_event(StepDone(epoch + 1, step + 1, len(batches), losses[-1], progress))
+    return float(np.mean(losses))
 
 
 def _motions(
     model: DeformerNet,
     frames: Frames,
+    *,
     batch: Batch,
     augmentation: Augmentation | None,
     rng: np.random.Generator,
@@ -215,13 +249,13 @@ def _motions(
     device = frames.grasps.device
     rows, groups = batch.frames.to(device), batch.groups.to(device)
     current, goal = batch.current.to(device), batch.goal.to(device)
-    clouds, grasps = frames.clouds.take(rows), frames.grasps[rows]
-    true = grasps[goal] - grasps[current]
+    clouds = frames.clouds.take(rows)
+    true = frames.motions(rows[current], rows[goal])
     if augmentation is not None:
         placement = augmentation.draw(rng, batch.group_count).to(device)
         unit = model.config.coordinate_unit
-        clouds = place(clouds, placement, groups, coordinate_unit=unit)
-        true = turn(true, placement, groups[current])
+        clouds = place(clouds, placement, groups=groups, coordinate_unit=unit)
+        true = turn(true, placement, groups=groups[current])
     features = model.encode(clouds)
     return model.motion(features[current], features[goal]), true
 

@@ -47,8 +47,8 @@ class RunWriter:
             file.write(json.dumps(metrics) + "\n")
         weights = model.state_dict()
         if done.best:
-            save(self.path / BEST, weights, model.config, metrics=metrics)
-        save(self.path / LAST, weights, model.config, metrics=metrics)
+            save(self.path / BEST, weights, config=model.config, metrics=metrics)
+        save(self.path / LAST, weights, config=model.config, metrics=metrics)
 
 
 def read_config(run: Path) -> dict[str, Any]:

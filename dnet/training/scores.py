@@ -7,7 +7,6 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from dnet.nets.deformernet import DeformerNet
-from dnet.training.batches import ordered_pairs
 from dnet.training.frames import Frames
 
 _CLOUDS, _PAIRS = 32, 65536
@@ -62,26 +61,16 @@ def errors_of(model: DeformerNet, frames: Frames) -> Errors:
     model.eval()
     try:
         with torch.no_grad():
-            current, goal = _pairs(frames)
+            current, goal = frames.all_pairs()
             predicted = _predict(model, frames, current, goal)
     finally:
         model.train(was_training)
-    true = frames.grasps[goal] - frames.grasps[current]
+    true = frames.motions(current, goal)
     from_rest = frames.rest[current]
     return Errors(
         score(predicted, true),
         score(predicted[from_rest], true[from_rest]) if from_rest.any() else None,
     )
-
-
-def _pairs(frames: Frames) -> tuple[Int64[Tensor, " p"], Int64[Tensor, " p"]]:
-    device = frames.grasps.device
-    current, goal = [], []
-    for rows in frames.episodes:
-        one, other = ordered_pairs(len(rows))
-        current.append(torch.from_numpy(one) + rows.start)
-        goal.append(torch.from_numpy(other) + rows.start)
-    return torch.cat(current).to(device), torch.cat(goal).to(device)
 
 
 def _predict(

@@ -1,0 +1,82 @@
+# Everything on a fresh Debian or Ubuntu with Python 3.11, make and git: `make demo`, `make test`.
+SHELL := /bin/bash
+PYTHON ?= python3.11
+VENV ?= .venv
+BIN := $(VENV)/bin
+TORCH := $(shell sed -n 's/^torch==//p' constraints.txt)
+# The CPU build of torch is 200 MB instead of several GB; a machine with an NVIDIA GPU gets CUDA's.
+TORCH_CPU_INDEX := https://download.pytorch.org/whl/cpu
+# What Open3D needs to be imported, and what Rerun needs to draw without a screen.
+LIBRARIES := libusb-1.0-0 libgl1 libegl1 libgomp1 mesa-vulkan-drivers libxkbcommon0 \
+	libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2
+
+.DEFAULT_GOAL := help
+.PHONY: help setup libraries demo test check format lint type layers build benchmark clean
+
+help: ## Say what there is
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+setup: $(VENV)/.installed libraries ## Make .venv with locked dependencies; again: nothing
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not here: apt-get install python3.11 python3.11-venv, or make PYTHON=/path/to/python3.11"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then \
+		$(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)"; \
+	else \
+		$(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)+cpu" 2>/dev/null \
+		|| $(BIN)/pip install --quiet -c constraints.txt --extra-index-url $(TORCH_CPU_INDEX) "torch==$(TORCH)+cpu" \
+		|| $(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)"; \
+	fi
+	$(BIN)/pip install --quiet -c constraints.txt -e ".[dev]"
+	@touch $@
+
+libraries: ## Install the system libraries of Open3D and Rerun, or say what to run
+	@missing=""; for library in $(LIBRARIES); do \
+		dpkg-query -W -f='$${Status}' $$library 2>/dev/null | grep -q "ok installed" || missing="$$missing $$library"; \
+	done; \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	if ! command -v apt-get >/dev/null; then \
+		echo "Not a Debian or Ubuntu: install the equivalents of$$missing"; \
+	elif [ "$$(id -u)" = 0 ]; then \
+		apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing >/dev/null \
+			|| echo "Could not install them; run: apt-get install --no-install-recommends$$missing"; \
+	elif sudo -n true 2>/dev/null; then \
+		sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing >/dev/null \
+			|| echo "Could not install them; run: sudo apt-get install --no-install-recommends$$missing"; \
+	else \
+		echo "For pictures without a screen, run: sudo apt-get install --no-install-recommends$$missing"; \
+	fi
+
+demo: setup ## Record, train, servo and play on a small scale; results in demo/
+	$(BIN)/dnet demo
+
+test: setup ## Run the checks and the tests
+	$(MAKE) --no-print-directory check
+	$(BIN)/python -m pytest
+
+check: lint type layers ## Run the static checks
+
+format: ## Format the code
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+lint:
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+type:
+	$(BIN)/mypy
+	$(BIN)/pyright
+
+layers:
+	$(BIN)/lint-imports
+
+build: setup ## Build the wheel and the sdist into dist/
+	$(BIN)/python -m build
+
+benchmark: setup ## Measure speed against peers, as ratios
+	$(BIN)/python -m pytest tests/benchmarks -s
+
+clean: ## Remove .venv, build products and caches
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,199 @@
+"""`dnet train`: learn from recorded episodes how far the grasp must move."""
+
+import math
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import torch
+    from rich.console import Console
+
+    from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+    from dnet.training.episodes import Division
+    from dnet.training.frames import Frames
+    from dnet.training.loop import Result, TrainingSettings
+    from dnet.training.run import RunWriter
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train DeformerNet on episodes and keep the network that judges unseen ones best.
+
+    Every settled frame of an episode is paired with every other: the network sees both clouds
+    and learns the motion of the grasp between them. Some episodes are held out to judge it by.
+    The run directory gets config.json, best.safetensors, last.safetensors and metrics.jsonl, a
+    line an epoch. Ctrl-C stops after the last whole epoch and keeps what was learned.
+
+    Example: dnet train --from-mcap data/small --out runs/small --epochs 200
+    """
+
+    from_mcap: Path
+    """Directory with episodes of `dnet record`; two or more."""
+    out: Path
+    """Directory for the run; made if need be, must hold none yet."""
+    epochs: int = 200
+    """How often every frame is seen (paper: 100, of 30,000 frames)."""
+    minutes: float | None = None
+    """Stop in this time even so. The schedule then follows the clock, and a second training on
+    the same data ends in slightly different weights."""
+    size: Literal["light", "paper"] = "light"
+    """Levels of the encoder; `paper` takes seven times as long."""
+    norm: Literal["group", "batch"] = "group"
+    """Normalisation; `batch` is what the paper states."""
+    schedule: Literal["cosine", "step"] = "cosine"
+    """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
+    augment: bool = True
+    """Turn and shift each group of frames about the table at random."""
+    validation: float = 0.25
+    """Share of the episodes to hold out; at least one is."""
+    seed: int = 0
+    """Of the division, the first weights, the order and the augmentation."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """Where to train; `auto` takes a GPU if there is one."""
+
+    def run(self) -> None:
+        """Train, with a progress bar, and print the errors.
+
+        Raises:
+            DnetError: If the episodes, the output directory or an option will not do.
+        """
+        from rich.console import Console  # noqa: PLC0415
+
+        from dnet.commands.training_screen import error_table, show_data  # noqa: PLC0415
+        from dnet.nets.deformernet import DeformerNetConfig  # noqa: PLC0415
+        from dnet.training.allocation import keep_pages  # noqa: PLC0415
+        from dnet.training.episodes import divide  # noqa: PLC0415
+        from dnet.training.loop import new_network  # noqa: PLC0415
+        from dnet.training.run import RunWriter  # noqa: PLC0415
+        from dnet.training.scores import errors_of  # noqa: PLC0415
+
+        self._check()
+        settings, device, console = self._settings(), self._device(), Console(stderr=True)
+        division = divide(self.from_mcap, fraction=self.validation, seed=self.seed)
+        config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.points)
+        writer = RunWriter(self.out, self._describe(division, config, settings))
+        keep_pages()
+        training, validation = (
+            frames.to(device) for frames in _read(division, config, console=console)
+        )
+        model = new_network(config, seed=self.seed).to(device)
+        show_data(console, division, training)
+        result = self._fit(
+            model,
+            training,
+            validation=validation,
+            settings=settings,
+            writer=writer,
+            console=console,
+        )
+        model.load_state_dict(result.best)
+        errors = {
+            "training": errors_of(model, training),
+            "validation": errors_of(model, validation),
+        }
+        Console().print(error_table(errors))
+        console.print(_closing_line(result, self.out))
+
+    def _check(self) -> None:
+        from dnet.errors import TooFew, TooShort  # noqa: PLC0415
+
+        for what, value, least in (("--epochs", self.epochs, 1), ("--seed", self.seed, 0)):
+            if value < least:
+                raise TooFew(what, value, least)
+        if self.minutes is not None and not self.minutes > 0:
+            raise TooShort("--minutes", self.minutes)
+
+    def _settings(self) -> "TrainingSettings":
+        from dnet.training.augment import Augmentation  # noqa: PLC0415
+        from dnet.training.loop import TrainingSettings  # noqa: PLC0415
+
+        return TrainingSettings(
+            epochs=self.epochs,
+            schedule=self.schedule,
+            seed=self.seed,
+            augmentation=Augmentation() if self.augment else None,
+        )
+
+    def _device(self) -> "torch.device":
+        import torch  # noqa: PLC0415
+
+        from dnet.errors import NoDevice  # noqa: PLC0415
+
+        present = torch.cuda.is_available()
+        if self.device == "cuda" and not present:
+            raise NoDevice("cuda")
+        return torch.device("cuda" if present and self.device != "cpu" else "cpu")
+
+    def _describe(
+        self, division: "Division", config: "DeformerNetConfig", settings: "TrainingSettings"
+    ) -> dict[str, Any]:
+        """Return what shaped the run, as config.json holds it."""
+        return {
+            "network": asdict(config),
+            "training": asdict(settings) | {"minutes": self.minutes},
+            "data": {
+                "directory": str(self.from_mcap),
+                "training": [survey.episode_id for survey in division.training],
+                "validation": [survey.episode_id for survey in division.validation],
+            },
+            "versions": {name: version(name) for name in ("deformernet", "torch")},
+        }
+
+    def _fit(
+        self,
+        model: "DeformerNet",
+        training: "Frames",
+        *,
+        validation: "Frames",
+        settings: "TrainingSettings",
+        writer: "RunWriter",
+        console: "Console",
+    ) -> "Result":
+        from dnet.commands.training_screen import TrainingBar  # noqa: PLC0415
+        from dnet.training.loop import EpochDone, StepDone, fit  # noqa: PLC0415
+
+        with TrainingBar(console, epochs=self.epochs) as bar:
+
+            def on_event(event: StepDone | EpochDone) -> None:
+                bar.show(event)
+                if isinstance(event, EpochDone):
+                    writer.add(event, model)
+
+            return fit(
+                model,
+                training,
+                validation=validation,
+                settings=settings,
+                on_event=on_event,
+                seconds=math.inf if self.minutes is None else 60 * self.minutes,
+            )
+
+
+def _read(
+    division: "Division", config: "DeformerNetConfig", *, console: "Console"
+) -> "Iterator[Frames]":
+    """Yield the training and the validation frames, with a progress bar."""
+    from dnet.commands.progress import progress  # noqa: PLC0415
+    from dnet.training.episodes import open_each  # noqa: PLC0415
+    from dnet.training.frames import read_frames  # noqa: PLC0415
+
+    parts = (division.training, division.validation)
+    with progress(console, "clouds") as bar:
+        total = sum(survey.frames for part in parts for survey in part)
+        task = bar.add_task("finding neighbours", total=total)
+        for part in parts:
+            yield read_frames(open_each(part), config, on_cloud=lambda: bar.advance(task))
+
+
+def _closing_line(result: "Result", out: Path) -> str:
+    best = min(result.history, key=lambda done: done.validation.any_pair.mse_mm2)
+    seconds = result.history[-1].seconds
+    ended = "interrupted; " if result.interrupted else ""
+    return (
+        f"{ended}{len(result.history)} epochs in {seconds:.0f} s, the best was epoch "
+        f"{best.epoch}; wrote {out}"
+    )

@@ -1,0 +1,95 @@
+"""DeformerNet written plainly from the equations, over the weights of a `DeformerNet`.
+
+Every group is built before any layer sees it, neighbours come from a sorted matrix of distances,
+norms are their definitions, and no two steps are merged.
+"""
+
+import torch
+from torch import Tensor, nn
+
+from dnet.nets.deformernet import DeformerNet
+from dnet.nets.neighbourhoods import BANDWIDTHS, GROUPINGS
+from dnet.nets.pointconv import BatchNorm, GroupNorm, SetAbstraction
+
+
+def normalise(x: Tensor, norm: GroupNorm | BatchNorm) -> Tensor:
+    """Channels last, the batch first."""
+    over = tuple(range(1, x.ndim)) if isinstance(norm, GroupNorm) else tuple(range(x.ndim - 1))
+    if isinstance(norm, BatchNorm) and not norm.training:
+        mean, variance = norm.mean, norm.variance
+    else:
+        mean = x.mean(over, keepdim=True)
+        variance = x.var(over, correction=0, keepdim=True)
+    return (x - mean) / torch.sqrt(variance + norm.epsilon) * norm.weight + norm.bias
+
+
+def layer(x: Tensor, linear: nn.Linear, norm: GroupNorm | BatchNorm) -> Tensor:
+    product = torch.einsum("oi,...i->...o", linear.weight, x) + linear.bias
+    return torch.relu(normalise(product, norm))
+
+
+def small_net(x: Tensor, net: nn.Sequential) -> Tensor:
+    for one in net.children():
+        x = layer(x, one.linear, one.norm)
+    return x
+
+
+def inverse_density(points: Tensor, bandwidth: float) -> Tensor:
+    squares = (points[:, :, None] - points[:, None]).square().sum(-1)
+    return 1 / (torch.exp(-squares / (2 * bandwidth**2)) / (2.5 * bandwidth)).mean(-1)
+
+
+def pick(values: Tensor, rows: Tensor) -> Tensor:
+    return torch.stack([one[chosen] for one, chosen in zip(values, rows, strict=True)])
+
+
+def abstract(
+    level: SetAbstraction,
+    points: Tensor,
+    features: Tensor,
+    bandwidth: float,
+    grouping: tuple[int, int] | None,
+) -> tuple[Tensor, Tensor]:
+    density = inverse_density(points, bandwidth)
+    if grouping is None:
+        centroids = points.mean(1, keepdim=True)
+        rows = torch.arange(points.shape[1]).expand(len(points), 1, -1)
+    else:
+        count, neighbours = grouping
+        centroids = points[:, :count]
+        rows = torch.cdist(centroids, points).argsort(-1)[..., :neighbours]
+    offsets = pick(points, rows) - centroids[:, :, None]
+    scale = pick(density, rows)
+    scale = (scale / scale.max(-1, keepdim=True).values)[..., None]
+    hidden = torch.cat([offsets, pick(features, rows)], -1)
+    hidden = layer(hidden, level.point_linear, level.point_norm)
+    hidden = hidden * small_net(scale, level.density_net)
+    weights = small_net(offsets, level.weight_net)
+    summed = torch.einsum("bskc,bskw->bscw", hidden, weights).flatten(2)
+    return centroids, layer(summed, level.output_linear, level.output_norm)
+
+
+def encode(model: DeformerNet, points: Tensor) -> Tensor:
+    first, second = GROUPINGS[model.config.size]
+    encoder = model.encoder
+    for level, bandwidth, grouping in (
+        (encoder.first, BANDWIDTHS[0], (first.centroids, first.neighbours)),
+        (encoder.second, BANDWIDTHS[1], (second.centroids, second.neighbours)),
+        (encoder.third, BANDWIDTHS[2], None),
+    ):
+        features = points if level is encoder.first else features  # noqa: F821
+        points, features = abstract(level, points, features, bandwidth, grouping)
+    return features[:, 0]
+
+
+def motion(model: DeformerNet, current: Tensor, goal: Tensor) -> Tensor:
+    """From clouds in metres to motions in metres."""
+    unit = model.config.coordinate_unit
+    hidden = encode(model, goal / unit) - encode(model, current / unit)
+    children = list(model.head.hidden.children())
+    for linear, norm in zip(children[::3], children[1::3], strict=True):
+        assert isinstance(linear, nn.Linear)
+        assert isinstance(norm, GroupNorm | BatchNorm)
+        hidden = layer(hidden, linear, norm)
+    output = torch.einsum("oi,pi->po", model.head.output.weight, hidden) + model.head.output.bias
+    return output * model.config.motion_unit

@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dnet.geometry.sampling import farthest_points
+from dnet.nets.neighbourhoods import (
+    BANDWIDTHS,
+    GROUPINGS,
+    Grouping,
+    Neighbourhoods,
+    find_neighbourhoods,
+    stack,
+)
+from dnet.types import Cloud
+
+FEW = (Grouping(12, 5), Grouping(4, 6))
+
+
+def cloud(seed: int, count: int = 40) -> Cloud:
+    rng = np.random.default_rng(seed)
+    return farthest_points(rng.normal(size=(count, 3)).astype(np.float32), count)
+
+
+def squares(points: Cloud) -> np.ndarray:
+    exact = points.astype(np.float64)
+    return np.square(exact[:, None] - exact[None]).sum(-1)
+
+
+def tables(found: Neighbourhoods) -> list[torch.Tensor]:
+    return [found.points, *found.neighbours, *found.inverse_densities]
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_each_centroid_gathers_its_nearest_points_and_itself(seed: int) -> None:
+    points = cloud(seed)
+    found = find_neighbourhoods(points, FEW)
+    for table, below, grouping in zip(found.neighbours, (40, 12), FEW, strict=True):
+        assert table.shape == (grouping.centroids, grouping.neighbours)
+        distances = squares(points[:below])
+        for centroid, rows in enumerate(table.long().numpy()):
+            assert centroid in rows
+            assert len(set(rows)) == grouping.neighbours
+            left_out = np.setdiff1d(np.arange(below), rows)
+            assert distances[centroid][rows].max() <= distances[centroid][left_out].min()
+
+
+@given(seed=st.integers(0, 2**32 - 1), far=st.sampled_from([0.0, 2.0, 64.0]))
+@settings(max_examples=30, deadline=None)
+def test_densities_are_those_of_double_precision_wherever_the_cloud_stands(
+    seed: int, far: float
+) -> None:
+    points = (cloud(seed) * 0.3 + far).astype(np.float32)
+    found = find_neighbourhoods(points, FEW)
+    for got, bandwidth, count in zip(
+        found.inverse_densities, BANDWIDTHS, (40, 12, 4), strict=True
+    ):
+        kernel = np.exp(-squares(points[:count]) / (2 * bandwidth**2)) / (2.5 * bandwidth)
+        np.testing.assert_allclose(got.numpy(), 1 / kernel.mean(axis=1), rtol=1e-5)
+
+
+def test_a_lonely_point_has_a_larger_inverse_density_than_a_crowded_one() -> None:
+    crowd = np.random.default_rng(0).normal(scale=0.01, size=(39, 3))
+    points = np.vstack([[1.0, 1.0, 1.0], crowd]).astype(np.float32)
+    density = find_neighbourhoods(points, FEW).inverse_densities[0]
+    assert density[0] > 10 * density[1:].max()
+
+
+def test_a_batch_holds_each_cloud_as_it_was() -> None:
+    singles = [find_neighbourhoods(cloud(seed), FEW) for seed in range(4)]
+    batch = stack(singles)
+    assert len(batch) == 4
+    some = batch.take(torch.tensor([3, 1]))
+    for place, single in enumerate((singles[3], singles[1])):
+        for many, one in zip(tables(some), tables(single), strict=True):
+            assert torch.equal(many[place], one)
+
+
+def test_moving_to_a_device_keeps_the_tables() -> None:
+    found = find_neighbourhoods(cloud(0), FEW)
+    for before, after in zip(tables(found), tables(found.to(torch.device("cpu"))), strict=True):
+        assert torch.equal(before, after)
+
+
+def test_tables_do_not_change_with_the_array_that_they_came_from() -> None:
+    points = cloud(0)
+    found = find_neighbourhoods(points, FEW)
+    before = found.points.clone()
+    points[:] = 0
+    assert torch.equal(found.points, before)
+
+
+def test_coincident_points_have_finite_densities() -> None:
+    points = np.zeros((40, 3), dtype=np.float32)
+    for density, bandwidth in zip(
+        find_neighbourhoods(points, FEW).inverse_densities, BANDWIDTHS, strict=True
+    ):
+        torch.testing.assert_close(density, torch.full_like(density, 2.5 * bandwidth))
+
+
+@pytest.mark.parametrize("size", ["light", "paper"])
+def test_thirty_thousand_clouds_take_at_most_three_gigabytes(size: str) -> None:
+    points = np.random.default_rng(0).normal(size=(2048, 3)).astype(np.float32)
+    found = find_neighbourhoods(points, GROUPINGS["light" if size == "light" else "paper"])
+    nbytes = sum(table.nbytes for table in tables(found))
+    assert 30_000 * nbytes < 3e9
