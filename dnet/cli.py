@@ -53,13 +53,13 @@ def parse(arguments: Sequence[str]) -> Command:
     return chosen
 
 
-def main() -> None:
-    """Run the command that the arguments name.
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command that the arguments name, by default those of the process.
 
     Exits with 0; with 1 and one line on stderr where dnet refuses; with 2 for arguments that it
     cannot read; with 130 after Ctrl-C.
     """
-    command = parse(sys.argv[1:])
+    command = parse(sys.argv[1:] if arguments is None else arguments)
     try:
         command.run()
     except DnetError as error:

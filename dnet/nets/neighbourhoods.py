@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float32, Int16, Integer
+from jaxtyping import Float, Float32, Int16, Integer
 from scipy.spatial import cKDTree
 from torch import Tensor
 
@@ -50,12 +50,12 @@ class Neighbourhoods:
     `points` leaves the rest true.
     """
 
-    points: Float32[Tensor, "*batch n 3"]
+    points: Float[Tensor, "*batch n 3"]
     """Coordinates in farthest-point order, in the network's unit."""
     neighbours: tuple[Int16[Tensor, "*batch s1 k1"], Int16[Tensor, "*batch s2 k2"]]
     """For each of the first two levels: rows that each centroid gathers."""
     inverse_densities: tuple[
-        Float32[Tensor, "*batch n"], Float32[Tensor, "*batch s1"], Float32[Tensor, "*batch s2"]
+        Float[Tensor, "*batch n"], Float[Tensor, "*batch s1"], Float[Tensor, "*batch s2"]
     ]
     """For each level: one over the density at every point that it gathers from."""
 

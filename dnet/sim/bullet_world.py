@@ -8,7 +8,7 @@ from jaxtyping import Float64, Int64
 from dnet.errors import EmptyGrasp
 from dnet.geometry.camera import Camera, DepthImage
 from dnet.geometry.pose import inverse, rotation_z
-from dnet.sim.arms import Placement
+from dnet.sim.arms import HOME, Placement
 from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
@@ -59,6 +59,9 @@ class BulletWorld:
         self.mesh: TetrahedralMesh = box_mesh(self.settings.box.size, self.settings.box.cells)
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._time = 0.0
+        self._joints = (HOME, HOME)
+        self._jaws: Pose = self.settings.placement.arms[1].forward(HOME)
+        self.object_id = -1
 
     def close(self) -> None:
         """Stop the server."""
@@ -95,6 +98,7 @@ class BulletWorld:
             poisson=self.settings.box.poisson,
             density=self.settings.box.density,
         )
+        self.object_id = self._body.body
         self._rest = nodes
         self._held = np.flatnonzero(self.mesh.nodes[:, 0] <= self.mesh.nodes[:, 0].min() + 1e-9)
         self._gripped = np.setdiff1d(gripped, self._held)
@@ -116,7 +120,7 @@ class BulletWorld:
         self._body.pin(self._held)
         self._body.pin(self._gripped)
         self._joints = self._grasped
-        self._jaws: Pose = self.settings.placement.arms[1].forward(self._grasped[1])
+        self._jaws = self.settings.placement.arms[1].forward(self._grasped[1])
 
     @property
     def time(self) -> float:
@@ -132,11 +136,6 @@ class BulletWorld:
     def tip(self) -> Point:
         """Where the moving arm's jaws meet, in the world."""
         return self._jaws[:3, 3].copy()
-
-    @property
-    def object_id(self) -> int:
-        """The object's number in the mask of a depth image."""
-        return self._body.body
 
     def nodes(self) -> Nodes:
         """Return the mesh nodes, in metres, (n, 3)."""

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from dnet.nets.deformernet import DeformerNet
 from dnet.nets.neighbourhoods import BANDWIDTHS, GROUPINGS
-from dnet.nets.pointconv import BatchNorm, GroupNorm, SetAbstraction
+from dnet.nets.pointconv import BatchNorm, GroupNorm, PointwiseLayer, SetAbstraction
 
 
 def normalise(x: Tensor, norm: GroupNorm | BatchNorm) -> Tensor:
@@ -30,6 +30,7 @@ def layer(x: Tensor, linear: nn.Linear, norm: GroupNorm | BatchNorm) -> Tensor:
 
 def small_net(x: Tensor, net: nn.Sequential) -> Tensor:
     for one in net.children():
+        assert isinstance(one, PointwiseLayer)
         x = layer(x, one.linear, one.norm)
     return x
 
@@ -72,20 +73,19 @@ def abstract(
 def encode(model: DeformerNet, points: Tensor) -> Tensor:
     first, second = GROUPINGS[model.config.size]
     encoder = model.encoder
+    features = points
     for level, bandwidth, grouping in (
         (encoder.first, BANDWIDTHS[0], (first.centroids, first.neighbours)),
         (encoder.second, BANDWIDTHS[1], (second.centroids, second.neighbours)),
         (encoder.third, BANDWIDTHS[2], None),
     ):
-        features = points if level is encoder.first else features  # noqa: F821
         points, features = abstract(level, points, features, bandwidth, grouping)
     return features[:, 0]
 
 
 def motion(model: DeformerNet, current: Tensor, goal: Tensor) -> Tensor:
-    """From clouds in metres to motions in metres."""
-    unit = model.config.coordinate_unit
-    hidden = encode(model, goal / unit) - encode(model, current / unit)
+    """From clouds in the network's unit to motions in metres."""
+    hidden = encode(model, goal) - encode(model, current)
     children = list(model.head.hidden.children())
     for linear, norm in zip(children[::3], children[1::3], strict=True):
         assert isinstance(linear, nn.Linear)

@@ -1,4 +1,5 @@
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +11,12 @@ from torch import Tensor
 from dnet.errors import BadCloud, LongCloud, ShortCloud, TooFew
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig, prepare
-from dnet.nets.neighbourhoods import Neighbourhoods, Size, stack
+from dnet.nets.neighbourhoods import BANDWIDTHS, Neighbourhoods, Size, stack
 from dnet.nets.pointconv import BatchNorm, Norm
 from dnet.types import Cloud
 from tests.nets import reference
 
-SIZES: tuple[tuple[Size, int], ...] = (("light", 192), ("paper", 560))
+SIZES: tuple[tuple[Size, int], ...] = (("light", 136), ("paper", 520))
 NORMS: tuple[Norm, ...] = ("group", "batch")
 
 
@@ -48,6 +49,15 @@ def watch_closely(model: DeformerNet) -> None:
             module.momentum = 1.0
 
 
+def in_double(seen: Neighbourhoods) -> Neighbourhoods:
+    points = seen.points.double()
+    first, second, third = (
+        reference.inverse_density(points[:, : densities.shape[1]], bandwidth)
+        for densities, bandwidth in zip(seen.inverse_densities, BANDWIDTHS, strict=True)
+    )
+    return replace(seen, points=points, inverse_densities=(first, second, third))
+
+
 def gradients(loss: Tensor, model: DeformerNet) -> dict[str, Tensor]:
     model.zero_grad()
     torch.autograd.backward(loss)
@@ -64,32 +74,32 @@ def gradients(loss: Tensor, model: DeformerNet) -> dict[str, Tensor]:
 def test_the_network_is_the_one_of_the_equations(
     size: Size, points: int, norm: Norm, training: bool
 ) -> None:
-    model = network(size, norm, points)
+    single = network(size, norm, points)
     seen = clouds(6, points)
     if norm == "batch":
-        watch_closely(model)
-        model.train()(batch(seen, model), batch(seen[::-1], model))
-    model.train(training)
+        watch_closely(single)
+        single.train()(batch(seen, single), batch(seen[::-1], single))
+    single.train(training)
+    model = copy.deepcopy(single).double()
     plain = copy.deepcopy(model)
-    wish = torch.randn(3, 3, generator=torch.Generator().manual_seed(1))
+    wish = torch.arange(9.0).view(3, 3).double()
 
-    features = model.encode(batch(seen, model))
-    positions = torch.from_numpy(np.stack(seen))
-    want_features = reference.encode(plain, positions / plain.config.coordinate_unit)
-    torch.testing.assert_close(features, want_features, rtol=1e-5, atol=1e-5)
-
-    got = model(batch(seen[:3], model), batch(seen[3:], model)) / model.config.motion_unit
-    current, goal = torch.split(positions, 3)
-    want = reference.motion(plain, current, goal) / plain.config.motion_unit
-    torch.testing.assert_close(got, want, rtol=1e-5, atol=1e-5)
-    assert want.std(dim=0).min() > 1e-3
-
+    here, there = in_double(batch(seen[:3], model)), in_double(batch(seen[3:], model))
+    got = model(here, there) / model.config.motion_unit
+    want = reference.motion(plain, here.points, there.points) / plain.config.motion_unit
+    torch.testing.assert_close(got, want, rtol=1e-8, atol=1e-8)
+    assert want.std(dim=0).max().item() > 1e-7
     got_gradients = gradients((got - wish).square().sum(), model)
     want_gradients = gradients((want - wish).square().sum(), plain)
     largest = max(float(gradient.abs().max()) for gradient in want_gradients.values())
     for name, gradient in want_gradients.items():
-        error = float((got_gradients[name] - gradient).abs().max())
-        assert error < 1e-5 * largest, name
+        torch.testing.assert_close(
+            got_gradients[name], gradient, rtol=1e-6, atol=1e-7 * largest, msg=name
+        )
+
+    exact = reference.encode(plain, torch.cat([here.points, there.points])).float()
+    rounded = single.encode(batch(seen, single))
+    torch.testing.assert_close(rounded, exact, rtol=5e-5, atol=5e-5 * exact.max().item())
 
 
 def test_running_figures_are_kept_as_batch_normalisation_defines_them() -> None:
@@ -140,7 +150,7 @@ def test_encoding_once_for_many_pairs_is_the_same_as_encoding_each_pair(norm: No
             for a, b in zip(current.tolist(), goal.tolist(), strict=True)
         ]
     )
-    torch.testing.assert_close(together, apart, rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(together, apart, rtol=1e-3, atol=2e-5)
 
 
 def test_a_cloud_in_a_batch_does_not_change_the_motion_of_another() -> None:
@@ -148,7 +158,7 @@ def test_a_cloud_in_a_batch_does_not_change_the_motion_of_another() -> None:
     seen = clouds(4)
     alone = model(batch(seen[:1], model), batch(seen[1:2], model))
     among = model(batch(seen[::2], model), batch(seen[1::2], model))[:1]
-    torch.testing.assert_close(among, alone, rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(among, alone, rtol=1e-3, atol=2e-5)
 
 
 @pytest.mark.parametrize("norm", NORMS)

@@ -54,9 +54,7 @@ def test_densities_are_those_of_double_precision_wherever_the_cloud_stands(
 ) -> None:
     points = (cloud(seed) * 0.3 + far).astype(np.float32)
     found = find_neighbourhoods(points, FEW)
-    for got, bandwidth, count in zip(
-        found.inverse_densities, BANDWIDTHS, (40, 12, 4), strict=True
-    ):
+    for got, bandwidth, count in zip(found.inverse_densities, BANDWIDTHS, (40, 12, 4), strict=True):
         kernel = np.exp(-squares(points[:count]) / (2 * bandwidth**2)) / (2.5 * bandwidth)
         np.testing.assert_allclose(got.numpy(), 1 / kernel.mean(axis=1), rtol=1e-5)
 

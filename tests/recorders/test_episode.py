@@ -1,6 +1,5 @@
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BackInTime, BadNumber, OccupiedOutput
 from dnet.recorders.arms import orientation_in_world
 from dnet.recorders.episode import EpisodeWriter
+from dnet.recorders.viewer import RERUN
 from dnet.types import Transform
 from tests.recorders.rollout import (
     ARMS,
@@ -165,7 +165,7 @@ def test_wall_times_do_not_change_the_bytes(tmp_path: Path) -> None:
 
 def test_rerun_checks_it_without_complaint(tmp_path: Path) -> None:
     path = write_servo(tmp_path / "run.mcap")
-    command = [sys.executable, "-m", "rerun_cli", "mcap", "check", "--full", str(path)]
+    command = [*RERUN, "mcap", "check", "--full", str(path)]
     checked = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert checked.returncode == 0, checked.stderr
     for topic in (*TOPICS.keys() - {"/log"}, "/cloud/goal", "/step"):

@@ -1,29 +1,163 @@
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pytest
-from rerun.chunk import RrdReader
 
 from dnet.errors import OccupiedOutput
-from dnet.recorders.replay import replay
 from dnet.recorders.rerun_run import RerunRun
-from dnet.datasets.reader import EpisodeReader
+from dnet.recorders.viewer import RERUN
 from dnet.sim.urdf import psm_urdf
-from dnet.types import ARMS as NAMES
-from tests.recorders.rollout import ARMS, frames, step, write, write_servo
+from tests.recorders.rollout import ARMS, GRASP, frames, step
+from tests.recorders.rrd import entities, rows
+
+TIPS = np.linspace(GRASP, GRASP + 0.01, 5)
 
 
-def columns(path: Path, entity: str, component: str, timeline: str | None = "sim_time") -> list[pa.Array]:
-    """Return the rows of one component of an entity, in time order, read by Rerun itself."""
-    rows = []
-    for chunk in RrdReader(path).store().stream().to_chunks():
-        batch = chunk.to_record_batch()
-        if str(chunk.entity_path) != entity or (timeline or "") not in ("", *batch.schema.names):
-            continue
-        if component in batch.schema.names:
-            times = batch.column(timeline).to_pylist() if timeline else [0] * batch.num_rows
-            rows += zip(times, batch.column(component), strict=True)
-    return [value for _, value in sorted(rows, key=lambda row: row[0])]
+def start(path: Path) -> RerunRun:
+    return RerunRun(path, name="a run", arms=ARMS, urdf=psm_urdf())
+
+
+def write(path: Path) -> Path:
+    """Write a run of two steps with the arms' way between them."""
+    seen = frames(2)
+    with start(path) as run:
+        run.log_goal(seen[-1].cloud)
+        run.log_step(0, step(seen[0], seen[-1]), TIPS)
+        times = np.linspace(0.1, 0.9, 9)
+        paths = tuple(np.tile(joints, (9, 1)) for joints in seen[0].joints)
+        run.arms_along(times, (paths[0], paths[1]))
+        run.log_frame(seen[1])
+        run.log_step(1, step(seen[-1], seen[-1], planned=False), None)
+        run.log_text("converged")
+    return path
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("run") / "run.rrd")
+
+
+def test_rerun_verifies_it(recording: Path) -> None:
+    command = [*RERUN, "rrd", "verify", str(recording)]
+    verified = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+def test_each_step_has_its_cloud_on_both_timelines(recording: Path) -> None:
+    seen = frames(2)
+    for timeline, times in (("step", [0, 1]), ("sim_time", [0.0, 0.5, 1.0])):
+        found = rows(recording, "/cloud/current", "Points3D:positions", timeline=timeline)
+        assert [time for time, _ in found] == times
+        np.testing.assert_array_equal(found[0][1], seen[0].cloud)
+        np.testing.assert_array_equal(found[-1][1], seen[-1].cloud)
+
+
+def test_the_goal_is_there_at_all_times(recording: Path) -> None:
+    ((_, points),) = rows(recording, "/cloud/goal", "Points3D:positions", timeline=None)
+    np.testing.assert_array_equal(points, frames(2)[-1].cloud)
+
+
+def test_curves_are_in_millimetres(recording: Path) -> None:
+    seen = frames(2)
+    first = step(seen[0], seen[-1])
+    chamfers = rows(recording, "/chamfer", "Scalars:scalars", timeline="step")
+    motions = rows(recording, "/motion_length", "Scalars:scalars", timeline="step")
+    planning = rows(recording, "/planning", "Scalars:scalars", timeline="step")
+    np.testing.assert_allclose([value[0] for _, value in chamfers], [1e3 * first.chamfer, 0])
+    np.testing.assert_allclose(
+        [value[0] for _, value in motions], [1e3 * np.linalg.norm(first.motion), 0]
+    )
+    assert planning == [(0.0, [1.5])]
+
+
+def test_the_motion_is_an_arrow_from_the_grasp(recording: Path) -> None:
+    seen = frames(2)
+    (_, origins), _ = rows(recording, "/motion", "Arrows3D:origins", timeline="step")
+    (_, vectors), _ = rows(recording, "/motion", "Arrows3D:vectors", timeline="step")
+    np.testing.assert_allclose(origins[0], seen[0].grasp, atol=1e-7)
+    np.testing.assert_allclose(vectors[0], seen[-1].grasp - seen[0].grasp, atol=1e-7)
+
+
+def test_the_planned_path_is_cleared_when_there_is_none(recording: Path) -> None:
+    ((_, strips),) = rows(recording, "/plan/tip", "LineStrips3D:strips", timeline="step")
+    np.testing.assert_allclose(strips[0], TIPS, atol=1e-7)
+    cleared = rows(recording, "/plan/tip", "Clear:is_recursive", timeline="step")
+    assert [time for time, _ in cleared] == [1]
+
+
+def test_both_arms_are_drawn_and_their_frames_hang_together(recording: Path) -> None:
+    drawn = [entity for entity in entities(recording) if "visual_geometries" in entity]
+    assert {entity.split("/")[1] for entity in drawn} == {"psm_left", "psm_right"}
+    assert not any("collision" in entity for entity in entities(recording))
+    named = set()
+    for entity in drawn:
+        named |= {
+            name for _, (name,) in rows(recording, entity, "CoordinateFrame:frame", timeline=None)
+        }
+    moved = {entity.removeprefix("/tf/") for entity in entities(recording) if "/tf/" in entity}
+    assert named
+    assert named <= moved
+
+
+def test_transforms_follow_the_arms_between_the_steps(recording: Path) -> None:
+    found = rows(
+        recording, "/tf/psm_right/yaw_link", "Transform3D:translation", timeline="sim_time"
+    )
+    times = [time for time, _ in found]
+    assert len(times) == 12
+    np.testing.assert_allclose(
+        sorted({*np.linspace(0.1, 0.9, 9), 0.0, 0.5, 1.0}), sorted(set(times))
+    )
+    on_steps = rows(recording, "/tf/psm_right/yaw_link", "Transform3D:translation", timeline="step")
+    assert len(on_steps) == 2
+
+
+def test_joints_are_curves_with_names(recording: Path) -> None:
+    ((_, names),) = rows(recording, "/joints/psm_right", "SeriesLines:names", timeline=None)
+    assert names[0] == "psm_right yaw"
+    found = rows(recording, "/joints/psm_right", "Scalars:scalars", timeline="step")
+    np.testing.assert_array_equal(found[0][1], frames(2)[0].joints[1])
+
+
+def test_the_log_says_what_happened(recording: Path) -> None:
+    lines = [text for _, (text,) in rows(recording, "/log", "TextLog:text", timeline="sim_time")]
+    assert [line.split(":")[0] for line in lines] == ["step 0", "step 1", "converged"]
+
+
+def test_an_existing_recording_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "run.rrd"
+    path.write_bytes(b"an older run")
+    with pytest.raises(OccupiedOutput, match=r"run\.rrd already holds a Rerun recording"):
+        start(path)
+    assert path.read_bytes() == b"an older run"
+
+
+def test_a_run_has_its_name_only_when_it_is_closed(tmp_path: Path) -> None:
+    run = start(tmp_path / "run.rrd")
+    run.log_goal(frames(2)[0].cloud)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.rrd.part"]
+    run.close()
+    run.close()
+    assert [file.name for file in tmp_path.iterdir()] == ["run.rrd"]
+
+
+def test_a_step_is_on_the_disk_when_it_is_logged(tmp_path: Path) -> None:
+    seen = frames(2)
+    run = start(tmp_path / "run.rrd")
+    run.log_step(0, step(seen[0], seen[-1]), TIPS)
+    # What is there after a kill at this moment.
+    left = tmp_path / "left.rrd"
+    left.write_bytes(run.part.read_bytes())
+    run.close()
+    assert len(rows(left, "/cloud/current", "Points3D:positions", timeline="step")) == 1
+
+
+def test_an_interrupted_run_keeps_its_steps_under_its_part_name(tmp_path: Path) -> None:
+    seen = frames(2)
+    with pytest.raises(KeyboardInterrupt), start(tmp_path / "run.rrd") as run:
+        run.log_step(0, step(seen[0], seen[-1]), TIPS)
+        raise KeyboardInterrupt
+    assert [file.name for file in tmp_path.iterdir()] == ["run.rrd.part"]
+    kept = run.part.rename(tmp_path / "kept.rrd")
+    assert len(rows(kept, "/cloud/current", "Points3D:positions", timeline="step")) == 1

@@ -1,0 +1,175 @@
+"""An MCAP container opened for random access: its index read once, its bytes mapped, not copied.
+
+The stock Python reader decompresses and parses a whole chunk for every query. This one reads the
+MessageIndex records (https://mcap.dev/spec), maps the file and slices payloads out of it. Every
+length in the file is checked against the file before it is believed, so a damaged or hostile
+file is refused, not obeyed.
+"""
+
+import mmap
+import struct
+import zlib
+from collections import OrderedDict
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int64
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+
+from dnet.datasets.chunk import decompress
+from dnet.datasets.refusals import damaged
+from dnet.datasets.summary import MAGIC, RECORD, UNREADABLE, Place, parse, read_summary
+from dnet.errors import BadEpisode, MissingPath
+
+CACHED_CHUNKS = 4
+
+Entries = Int64[np.ndarray, "_ 3"]
+"""Messages of a topic in file order: log time, chunk, offset in the chunk."""
+
+_MESSAGE = struct.Struct("<BQHIQQ")
+_MESSAGE_INDEX = struct.Struct("<BQHI")
+_CRC = struct.Struct("<I")
+_TIME = struct.Struct("<QQ")
+
+
+class McapFile:
+    """Topics, messages, metadata and attachments of one MCAP file.
+
+    Args:
+        path: The file; it must have a summary and message indexes, as finished files do.
+
+    Raises:
+        MissingPath: If there is no such file.
+        BadEpisode: If it is not an MCAP file, or is cut off, or is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise MissingPath(path, "episode", "`dnet inspect ls DIRECTORY` lists what is there")
+        self.path = path
+        with path.open("rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise BadEpisode(path, "is not an MCAP file", "give an .mcap of `dnet record`")
+            self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        self._bytes = memoryview(self._map)
+        self._cache: OrderedDict[int, memoryview] = OrderedDict()
+        self._checked = set[int]()
+        try:
+            self._summary = read_summary(path, self._bytes)
+        except BadEpisode:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let go of the file; views that were handed out stay valid as long as they live."""
+        self._cache.clear()
+        # While an array looks at the map, the system unmaps it with the last one.
+        with suppress(BufferError):
+            self._bytes.release()
+            self._map.close()
+
+    def entries(self, topic: str) -> Entries:
+        """Return where the messages of `topic` lie, in file order; none for an unknown topic."""
+        found: list[tuple[int, int, int]] = []
+        channel = self._summary.topics.get(topic)
+        if channel is not None:
+            for number, chunk in enumerate(self._summary.chunks):
+                offset = chunk.indexes.get(channel)
+                if offset is not None:
+                    rows = self._message_index(number, offset)
+                    found.extend((time, number, at) for at, time in rows)
+        try:
+            return np.array(found, dtype=np.int64).reshape(-1, 3)
+        except OverflowError as error:
+            raise damaged(self.path, f"its index of {topic} is broken") from error
+
+    def payload(self, chunk: int, offset: int) -> memoryview:
+        """Return the content of the message at `offset` of chunk number `chunk`.
+
+        Raises:
+            BadEpisode: If there is no message, or the chunk is damaged.
+        """
+        records = self._records(chunk)
+        if offset + _MESSAGE.size <= len(records):
+            opcode, length, *_ = _MESSAGE.unpack_from(records, offset)
+            end = offset + RECORD.size + length
+            if opcode == Opcode.MESSAGE and offset + _MESSAGE.size <= end <= len(records):
+                return records[offset + _MESSAGE.size : end]
+        raise damaged(self.path, f"it has no message at byte {offset} of chunk {chunk}")
+
+    def metadata(self, name: str) -> dict[str, str] | None:
+        """Return the metadata record called `name`, or None."""
+        place = self._summary.metadata.get(name)
+        if place is None:
+            return None
+        try:
+            return Metadata.read(parse(self._record(place, Opcode.METADATA))).metadata
+        except UNREADABLE as error:
+            raise damaged(self.path, f"its metadata {name} is unreadable") from error
+
+    @property
+    def attachments(self) -> tuple[str, ...]:
+        """Names of the attached files."""
+        return tuple(self._summary.attachments)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return the attached file called `name`, or None."""
+        place = self._summary.attachments.get(name)
+        if place is None:
+            return None
+        try:
+            record = self._record(place, Opcode.ATTACHMENT)
+            content = Attachment.read(parse(record)).data
+            (crc,) = _CRC.unpack(record[-_CRC.size :])
+        except UNREADABLE as error:
+            raise damaged(self.path, f"its attachment {name} is unreadable") from error
+        if crc and zlib.crc32(record[: -_CRC.size]) != crc:
+            raise damaged(self.path, f"its attachment {name} fails its checksum")
+        return content
+
+    def _message_index(self, number: int, offset: int) -> list[tuple[int, int]]:
+        """Return offset in the chunk and log time of each message, in file order."""
+        chunks = self._summary.chunks
+        # A chunk's indexes lie between it and the next chunk: no two chunks can share one.
+        first = chunks[number].offset + chunks[number].length
+        limit = chunks[number + 1].offset if number + 1 < len(chunks) else len(self._bytes)
+        start = offset + _MESSAGE_INDEX.size
+        if first <= offset and start <= limit:
+            opcode, length, _, size = _MESSAGE_INDEX.unpack_from(self._bytes, offset)
+            whole = length == size + 6 and size <= limit - start and size % _TIME.size == 0
+            if opcode == Opcode.MESSAGE_INDEX and whole:
+                pairs = _TIME.iter_unpack(self._bytes[start : start + size])
+                return sorted((at, time) for time, at in pairs)
+        raise damaged(self.path, f"the message index of its chunk {number} is broken")
+
+    def _records(self, number: int) -> memoryview:
+        """Return the decompressed records of a chunk, checked against its checksum once."""
+        cached = self._cache.get(number)
+        if cached is not None:
+            self._cache.move_to_end(number)
+            return cached
+        offset, length, _ = self._summary.chunks[number]
+        try:
+            records, crc = decompress(self._bytes[offset : offset + length])
+        except ValueError as error:
+            raise damaged(self.path, f"its chunk {number} is unreadable ({error})") from error
+        if number not in self._checked:
+            if crc and zlib.crc32(records) != crc:
+                raise damaged(self.path, f"its chunk {number} fails its checksum")
+            self._checked.add(number)
+        self._cache[number] = records
+        if len(self._cache) > CACHED_CHUNKS:
+            self._cache.popitem(last=False)
+        return records
+
+    def _record(self, place: Place, opcode: Opcode) -> memoryview:
+        offset, length = place
+        if length > len(self._bytes) or offset > len(self._bytes) - length:
+            raise ValueError("outside the file")
+        record = self._bytes[offset : offset + length]
+        kind, size = RECORD.unpack_from(record)
+        if kind != opcode or size != length - RECORD.size:
+            raise ValueError("not the record it should be")
+        return record[RECORD.size :]

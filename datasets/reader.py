@@ -1,0 +1,232 @@
+"""One episode file, read at random: its frames by number, each cloud a view of the file."""
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float64
+
+from dnet.datasets import messages
+from dnet.datasets.mcap_file import Entries, McapFile
+from dnet.datasets.point_cloud import read_point_cloud
+from dnet.errors import BadEpisode, MissingPath, NoSuchFrame
+from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Nodes, Transform
+
+SCHEMA_VERSION = "1"
+
+CLOUD, NODES, GOAL, POINT = "/cloud/current", "/cloud/nodes", "/cloud/goal", "/manipulation_point"
+JOINTS, TRANSFORMS, GRIPPER = "/joint_states", "/tf", "/gripper"
+FRAME, STEP, LOG = "/frame", "/step", "/log"
+FRAME_TOPICS = (CLOUD, NODES, POINT, JOINTS, TRANSFORMS, GRIPPER, FRAME)
+"""What a frame consists of; one that lacks any of them does not count."""
+
+_Source = TypeVar("_Source")
+_Value = TypeVar("_Value")
+
+
+class EpisodeReader:
+    """The frames, the goal and the steps of one episode.
+
+    Opening reads the index alone; a cloud is read when it is asked for, without a copy, and is
+    read-only. A reader can be sent to another process, which opens the file anew.
+
+    Args:
+        path: An `.mcap` of `dnet record` or `dnet servo`.
+
+    Raises:
+        MissingPath: If there is no such file.
+        BadEpisode: If it is not an episode, or is cut off, or is damaged.
+    """
+
+    path: Path
+    meta: EpisodeMeta
+    result: dict[str, Any] | None
+    """What the recording said of itself at its end; None if it never got there."""
+    kinds: tuple[FrameKind, ...]
+    """What each frame is."""
+    times: Float64[np.ndarray, "_"]
+    """Seconds of simulation at each frame, (n,)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = McapFile(path)
+        try:
+            self.meta = self._read_meta()
+            result = self._file.metadata("dnet.result")
+            self.result = (
+                None
+                if result is None
+                else self._decode("metadata `dnet.result`", messages.read_result, result)
+            )
+            self._entries = {topic: self._file.entries(topic) for topic in FRAME_TOPICS}
+            self.kinds, self.times = self._read_frames()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> "EpisodeReader":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __reduce__(self) -> "tuple[type[EpisodeReader], tuple[Path]]":
+        # A mapped file does not travel between processes; its path does.
+        return type(self), (self.path,)
+
+    def __len__(self) -> int:
+        """Return the number of whole frames."""
+        return len(self.kinds)
+
+    def close(self) -> None:
+        """Let go of the file; clouds that were read stay valid."""
+        self._file.close()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the recording ended by itself."""
+        return self.result is not None
+
+    @cached_property
+    def grasps(self) -> Float64[np.ndarray, "_ 3"]:
+        """The manipulation point at each frame, (n, 3)."""
+        points = np.zeros((len(self), 3))
+        for index in range(len(self)):
+            points[index] = self._message(GRIPPER, index, messages.read_position)
+        points.flags.writeable = False
+        return points
+
+    def cloud(self, index: int) -> Cloud:
+        """Return the visible surface at frame `index`, a read-only view of the file.
+
+        Raises:
+            NoSuchFrame: If there is no such frame.
+            BadEpisode: If the message is not a cloud.
+        """
+        return self._message(CLOUD, index, read_point_cloud)
+
+    def nodes(self, index: int) -> Nodes:
+        """Return the mesh nodes at frame `index`: ground truth for scores."""
+        return self._message(NODES, index, read_point_cloud)
+
+    def frame(self, index: int) -> Frame:
+        """Return all of frame `index`.
+
+        Raises:
+            NoSuchFrame: If there is no such frame.
+            BadEpisode: If one of its messages is not what it should be.
+        """
+        cloud = self.cloud(index)
+        return Frame(
+            time=float(self.times[index]),
+            kind=self.kinds[index],
+            cloud=cloud,
+            grasp=self._message(GRIPPER, index, messages.read_position),
+            joints=self._message(JOINTS, index, messages.read_joints),
+            nodes=self.nodes(index),
+        )
+
+    def transforms(self, index: int) -> list[Transform]:
+        """Return where every link of both arms stands at frame `index`.
+
+        Raises:
+            NoSuchFrame: If there is no such frame.
+            BadEpisode: If the message is not a list of transforms.
+        """
+        return self._message(TRANSFORMS, index, messages.read_transforms)
+
+    def goal(self) -> Cloud | None:
+        """Return the shape to reach, or None for a recording without one."""
+        clouds = self._all(GOAL, read_point_cloud)
+        return clouds[-1][1] if clouds else None
+
+    def steps(self) -> list[dict[str, Any]]:
+        """Return what each turn of the servo loop saw and did; none for a recording."""
+        return [step for _, step in self._all(STEP, messages.read_step)]
+
+    def lines(self) -> list[tuple[float, str]]:
+        """Return what the recording said to people: seconds of simulation and text."""
+        return self._all(LOG, messages.read_line)
+
+    @property
+    def attachments(self) -> tuple[str, ...]:
+        """Names of the attached files."""
+        return self._file.attachments
+
+    def attachment(self, name: str) -> bytes:
+        """Return the attached file called `name`.
+
+        Raises:
+            MissingPath: If nothing of that name is attached.
+        """
+        content = self._file.attachment(name)
+        if content is None:
+            held = ", ".join(self.attachments) or "nothing"
+            raise MissingPath(Path(name), "attachment", f"{self.path} holds {held}")
+        return content
+
+    def _read_meta(self) -> EpisodeMeta:
+        record = self._file.metadata("dnet.episode")
+        if record is None:
+            raise BadEpisode(
+                self.path,
+                "is an MCAP file but not a dnet episode: it has no metadata `dnet.episode`",
+                "give an .mcap of `dnet record`",
+            )
+        version = record.get("schema_version", "missing")
+        if version != SCHEMA_VERSION:
+            raise BadEpisode(
+                self.path,
+                f"has schema version {version}, this dnet reads {SCHEMA_VERSION}",
+                "use the dnet that wrote it, or record it again",
+            )
+        return self._decode("metadata `dnet.episode`", messages.read_meta, record)
+
+    def _read_frames(self) -> tuple[tuple[FrameKind, ...], Float64[np.ndarray, "_"]]:
+        """Return kind and time of every frame all of whose messages are there."""
+        count = min(len(entries) for entries in self._entries.values())
+        stamps = self._entries[FRAME][:count, 0]
+        for topic, entries in self._entries.items():
+            # Messages of one frame carry one time: a lost one would pair the rest wrongly.
+            if not np.array_equal(entries[:count, 0], stamps):
+                raise self._bad(topic, "its messages do not match the frames")
+        kinds: list[FrameKind] = []
+        times = np.zeros(count)
+        for index, entry in enumerate(self._entries[FRAME][:count].tolist()):
+            number, kind, times[index] = self._at(FRAME, entry, messages.read_frame_end)
+            if number != index:
+                raise self._bad(FRAME, f"frame {index} says that it is number {number}")
+            kinds.append(kind)
+        times.flags.writeable = False
+        return tuple(kinds), times
+
+    def _message(self, topic: str, index: int, read: Callable[[memoryview], _Value]) -> _Value:
+        if not 0 <= index < len(self):
+            raise NoSuchFrame(self.path, index, len(self))
+        return self._at(topic, self._entries[topic][index].tolist(), read)
+
+    def _all(self, topic: str, read: Callable[[memoryview], _Value]) -> list[tuple[float, _Value]]:
+        """Return seconds and value of every message of a topic that frames need not have."""
+        entries: Entries = self._file.entries(topic)
+        return [(entry[0] / 1e9, self._at(topic, entry, read)) for entry in entries.tolist()]
+
+    def _at(self, topic: str, entry: list[int], read: Callable[[memoryview], _Value]) -> _Value:
+        _, chunk, offset = entry
+        return self._decode(topic, read, self._file.payload(chunk, offset))
+
+    def _decode(self, what: str, read: Callable[[_Source], _Value], source: _Source) -> _Value:
+        try:
+            return read(source)
+        except messages.UNREADABLE as error:
+            raise self._bad(what, str(error)) from error
+
+    def _bad(self, what: str, why: str) -> BadEpisode:
+        return BadEpisode(self.path, f"has an unreadable {what} ({why})", "record it again")

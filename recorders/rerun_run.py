@@ -1,0 +1,132 @@
+"""A servo run as a Rerun recording, written while it happens."""
+
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float64
+
+from dnet.errors import OccupiedOutput
+from dnet.recorders.arms import ArmModel
+from dnet.recorders.blueprint import SERVO_APPLICATION, servo_blueprint
+from dnet.recorders.rerun_scene import CHAMFER, PLANNING, RerunScene, transforms_along
+from dnet.recorders.step_text import describe_step
+from dnet.types import Cloud, Frame, JointPath, Step
+
+
+class RerunRun:
+    """Writes a run as `path` + ".part", flushed at every step, and names it when it is closed.
+
+    Leaving the `with` block by an exception leaves the `.part` file, which Rerun can open when
+    it is renamed to end in `.rrd`.
+
+    Args:
+        path: Where the recording goes, an `.rrd`.
+        name: What the viewer calls it.
+        arms: Both arms.
+        urdf: The URDF of one arm, drawn twice.
+
+    Raises:
+        OccupiedOutput: If `path` is already there.
+    """
+
+    def __init__(self, path: Path, *, name: str, arms: ArmModel, urdf: str) -> None:
+        if path.exists():
+            raise OccupiedOutput(path, "a Rerun recording")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self.part = path.with_name(path.name + ".part")
+        self._arms = arms
+        self._now = 0.0
+        self._step: int | None = None
+        self._recording = rr.RecordingStream(SERVO_APPLICATION)
+        self._recording.save(self.part, default_blueprint=servo_blueprint())
+        self._recording.send_recording_name(name)
+        self._scene = RerunScene(self._recording, urdf=urdf, counter="step")
+        self._scene.name_joints(arms.joint_names)
+        self._closed = False
+
+    def __enter__(self) -> "RerunRun":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.close()
+        elif not self._closed:
+            self._disconnect()
+
+    def log_goal(self, cloud: Cloud) -> None:
+        """Log the shape to reach, for all times."""
+        self._scene.log_goal(cloud)
+        self._recording.flush()
+
+    def log_step(self, index: int, step: Step, tip_path: Float64[np.ndarray, "_ 3"] | None) -> None:
+        """Log one turn of the servo loop and flush it.
+
+        Args:
+            index: Its number, from 0.
+            step: What was seen and done.
+            tip_path: Planned positions of the moving arm's tip, (n, 3), if there is a plan.
+        """
+        frame, plan = step.frame, step.plan
+        self._now, self._step = frame.time, index
+        scene = self._scene
+        scene.set_time(frame.time, count=index)
+        scene.log_frame(frame, self._arms.transforms(frame.joints))
+        scene.log_motion(frame.grasp, step.motion)
+        scene.log_tip_path(tip_path)
+        scene.log_scalar(CHAMFER, 1e3 * step.chamfer)
+        if plan is not None:
+            scene.log_scalar(PLANNING, plan.milliseconds)
+        troubled = plan is not None and plan.status in ("partial", "failed")
+        scene.log_text(describe_step(step, index), level="WARN" if troubled else "INFO")
+        self._recording.flush()
+
+    def log_frame(self, frame: Frame) -> None:
+        """Log a frame that was seen on the way from one step to the next."""
+        self._scene.set_time(frame.time)
+        self._scene.log_frame(frame, self._arms.transforms(frame.joints))
+        self._recording.flush()
+
+    def arms_along(
+        self, times: Float64[np.ndarray, "_"], joints: tuple[JointPath, JointPath]
+    ) -> None:
+        """Log the arms on their way between two steps, so that playback is smooth.
+
+        Args:
+            times: Seconds of simulation, (n,).
+            joints: Positions of the holding and the moving arm at those times, (n, 6) each.
+        """
+        self._scene.log_transforms_along(times, transforms_along(self._arms, joints))
+        self._scene.log_joints_along(times, joints)
+        self._recording.flush()
+
+    def log_text(self, message: str) -> None:
+        """Log a line for people at the time of the last step."""
+        self._scene.set_time(self._now, count=self._step)
+        self._scene.log_text(message)
+        self._recording.flush()
+
+    def close(self) -> None:
+        """Write what is left and give the recording its name; a second call does nothing.
+
+        Raises:
+            OccupiedOutput: If somebody else wrote `path` in the meantime.
+        """
+        if self._closed:
+            return
+        self._disconnect()
+        if self.path.exists():
+            raise OccupiedOutput(self.path, "a Rerun recording")
+        self.part.replace(self.path)
+
+    def _disconnect(self) -> None:
+        self._closed = True
+        self._recording.flush()
+        self._recording.disconnect()

@@ -1,0 +1,191 @@
+"""The Rerun viewer as a child process: in a window, or without a screen, drawing one picture."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rerun.experimental import ViewerClient, ViewerState
+
+from dnet.errors import NoPicture, NoScreen, ViewerFailed
+from dnet.recorders.rerun_scene import TIME_TIMELINE
+
+RERUN = (
+    sys.executable,
+    "-c",
+    # `python -m rerun_cli` would lose the status.
+    "import sys; from rerun_cli.__main__ import main; sys.exit(main())",
+)
+"""The command line of Rerun that belongs to this Python, wherever the PATH leads."""
+LOCAL = "127.0.0.1"
+"""The viewer listens on every interface unless told otherwise."""
+WINDOW = "1600x900"
+TRIES = 3
+START_SECONDS = 20.0
+DRAW_SECONDS = 30.0
+NOTICE_SECONDS = 5.0
+"""The viewer covers its upper right corner with notices for about four seconds."""
+POLL_SECONDS = 0.25
+
+
+def show(files: Sequence[Path]) -> None:
+    """Open `files` in a window and wait until it is closed.
+
+    Raises:
+        NoScreen: If there is no screen to open it on.
+        ViewerFailed: If the viewer ends by an error.
+    """
+    screens = ("DISPLAY", "WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in screens):
+        raise NoScreen
+    command = _command("--port", "auto", *map(str, files))
+    with running(command, output=None, environment=_environment()) as viewer:
+        status = viewer.wait()
+    if status:
+        raise ViewerFailed(status)
+
+
+def draw(file: Path, picture: Path, *, seconds: float | None) -> None:
+    """Draw `file` as it stands at `seconds` of simulation, or at its end, into `picture`.
+
+    Raises:
+        NoPicture: If the viewer cannot draw on this machine.
+    """
+    why = ""
+    for _ in range(TRIES):
+        try:
+            content = _draw_once(file, seconds)
+        except (ConnectionError, RuntimeError, TimeoutError) as error:
+            why = " ".join(str(error).split())[:300]
+            continue
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        picture.write_bytes(content)
+        return
+    raise NoPicture(file, TRIES, why)
+
+
+def _draw_once(file: Path, seconds: float | None) -> bytes:
+    port = _free_port()
+    command = _command("--headless", "--port", str(port), "--hide-welcome-screen")
+    command += ["--window-size", WINDOW, str(file)]
+    with tempfile.TemporaryDirectory() as directory:
+        log = Path(directory) / "viewer.log"
+        environment = {"XDG_RUNTIME_DIR": directory, **_environment()}
+        with log.open("wb") as output, running(command, output.fileno(), environment) as viewer:
+            started = time.monotonic()
+            try:
+                client, state = _loaded(f"rerun+http://{LOCAL}:{port}/proxy", viewer)
+                _stop_at(client, _last_time(state) if seconds is None else seconds)
+                client.run_command("ui.toggle_top_panel")
+                return _settled_picture(client, started)
+            except (ConnectionError, RuntimeError, TimeoutError) as error:
+                if viewer.poll() is not None:
+                    said = log.read_text(errors="replace").strip().splitlines()[-1:]
+                    raise RuntimeError(f"the viewer ended: {' '.join(said)}") from error
+                raise
+
+
+def _loaded(url: str, viewer: "subprocess.Popen[bytes]") -> tuple[ViewerClient, ViewerState]:
+    """Wait until the viewer shows the whole recording."""
+    deadline = time.monotonic() + START_SECONDS
+    error: Exception | None = None
+    while time.monotonic() < deadline and viewer.poll() is None:
+        try:
+            client = ViewerClient.connect(url)
+            state = client.get_state()
+            # A viewer without a window works only when it is asked for a frame.
+            client.take_screenshot(max_size=64)
+        except (ConnectionError, RuntimeError) as refused:
+            error = refused
+        else:
+            if state.active_recording and not state.loading and state.views:
+                return client, state
+        time.sleep(POLL_SECONDS)
+    raise TimeoutError(f"no recording on screen after {START_SECONDS:.0f} s") from error
+
+
+def _stop_at(client: ViewerClient, seconds: float | None) -> None:
+    """Stop the recording at `seconds`; one without simulation time stays where it is."""
+    if seconds is not None:
+        client.set_time(TIME_TIMELINE, duration=seconds, play_state="paused")
+
+
+def _last_time(state: ViewerState) -> float | None:
+    """Return the end of the simulation's timeline, or None if the recording has none."""
+    ends = [
+        timeline.end
+        for recording in state.recordings
+        for timeline in recording.timelines
+        if timeline.name == TIME_TIMELINE and timeline.end is not None
+    ]
+    return max(ends) / 1e9 if ends else None
+
+
+def _settled_picture(client: ViewerClient, started: float) -> bytes:
+    """Return a picture that no longer changes, taken after the viewer's notices are gone."""
+    deadline = time.monotonic() + DRAW_SECONDS
+    before = b""
+    while True:
+        picture = client.take_screenshot()
+        late = time.monotonic()
+        if late > deadline or (late - started > NOTICE_SECONDS and picture == before):
+            return picture
+        before = picture
+        time.sleep(POLL_SECONDS)
+
+
+@contextmanager
+def running(
+    command: Sequence[str], output: int | None, environment: Mapping[str, str]
+) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run the viewer in a process group of its own, and end all of the group.
+
+    The command is a Python launcher: ending it alone would leave the viewer behind.
+    """
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=output,
+        start_new_session=True,
+    )
+    try:
+        yield process
+    finally:
+        _end(process)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    for sign in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            os.killpg(process.pid, sign)
+        except ProcessLookupError:
+            break
+        try:
+            process.wait(timeout=2)
+        except subprocess.TimeoutExpired:
+            continue
+    process.wait()
+
+
+def _command(*arguments: str) -> list[str]:
+    return [*RERUN, "--bind", LOCAL, *arguments]
+
+
+def _environment() -> dict[str, str]:
+    # The viewer is part of a command: it is not to ask about statistics in its output.
+    return {"RERUN_APP_ONLY": "true"}
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOCAL, 0))
+        port: int = probe.getsockname()[1]
+    return port

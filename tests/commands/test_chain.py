@@ -1,0 +1,159 @@
+"""The whole chain on a tiny scale: record, train, servo, look; each part takes what the last left."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dnet.cli import main
+from dnet.commands.servo import split_goal
+from dnet.datasets.reader import EpisodeReader
+from dnet.geometry.chamfer import chamfer
+
+RERUN = Path(sys.executable).parent / "rerun"
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("chain") / "demo"
+    main(["demo", "--out", str(out), "--pairs", "2", "--shapes", "3", "--minutes", "0.1"])
+    return out
+
+
+def servo(demo: Path, out: Path, goal: str, *more: str) -> None:
+    main(["servo", "--checkpoint", str(demo / "train"), "--goal", goal, "--out", str(out), *more])
+
+
+def test_the_demo_leaves_everything_it_names(demo: Path) -> None:
+    for name in (
+        "data/episode-0-00000.mcap",
+        "data/episode-0-00001.mcap",
+        "train/best.safetensors",
+        "train/config.json",
+        "train/metrics.jsonl",
+        "servo/run.mcap",
+        "servo/run.rrd",
+        "servo.png",
+        "episode.png",
+    ):
+        assert (demo / name).stat().st_size > 100
+    assert not list(demo.rglob("*.part"))
+
+
+def test_a_servo_run_is_an_episode_whose_figures_follow_from_its_clouds(demo: Path) -> None:
+    with EpisodeReader(demo / "servo" / "run.mcap") as run:
+        assert run.finished
+        assert run.kinds[0] == "rest"
+        goal = run.goal()
+        assert goal is not None
+        steps = run.steps()
+        result = run.result or {}
+        assert len(steps) == len(run) == len(result["chamfer"])
+        for number, step in enumerate(steps):
+            assert chamfer(run.cloud(number), goal) == pytest.approx(step["chamfer"], rel=1e-6)
+        source, frame = str(run.meta.settings["goal"]).rsplit(":", 1)
+        with EpisodeReader(demo / "data" / source) as episode:
+            np.testing.assert_array_equal(goal, episode.cloud(int(frame)))
+            assert run.meta.scene == episode.meta.scene
+            # It starts from what the episode started from: the same rest shape, seen again.
+            np.testing.assert_array_equal(run.cloud(0), episode.cloud(0))
+
+
+def test_the_arm_goes_where_the_plans_say(demo: Path) -> None:
+    with EpisodeReader(demo / "servo" / "run.mcap") as run:
+        moved = np.diff(run.grasps, axis=0)
+        for step, motion in zip(run.steps(), moved, strict=False):
+            np.testing.assert_allclose(motion, step["plan"]["achieved"], atol=1e-9)
+
+
+def test_rerun_accepts_the_recording_and_the_episode(demo: Path) -> None:
+    for arguments in (
+        ["rrd", "verify", demo / "servo" / "run.rrd"],
+        ["mcap", "check", "--full", demo / "servo" / "run.mcap"],
+    ):
+        ran = subprocess.run([RERUN, *arguments], capture_output=True, text=True, check=False)
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def test_the_same_seed_servoes_the_same_bytes(demo: Path, tmp_path: Path) -> None:
+    goal = f"{demo / 'data' / 'episode-0-00000.mcap'}:2"
+    for name in ("one", "two"):
+        servo(demo, tmp_path / name, goal, "--steps", "2")
+    one, two = ((tmp_path / name / "run.mcap").read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+def refusal(*arguments: object) -> str:
+    with pytest.raises(SystemExit) as caught:
+        main([str(argument) for argument in arguments])
+    assert isinstance(caught.value.code, str)
+    return caught.value.code
+
+
+def test_a_goal_frame_that_does_not_exist_is_refused(demo: Path, tmp_path: Path) -> None:
+    episode = demo / "data" / "episode-0-00000.mcap"
+    message = refusal(
+        "servo", "--checkpoint", demo / "train", "--goal", f"{episode}:99", "--out", tmp_path / "x"
+    )
+    assert f"{episode} has no frame 99: it has 4 frames, 0 to 3" in message
+    assert not (tmp_path / "x").exists()
+
+
+def test_an_episode_cut_off_in_the_middle_is_refused(demo: Path, tmp_path: Path) -> None:
+    whole = (demo / "data" / "episode-0-00000.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    for arguments in (
+        ("inspect", "info", cut),
+        ("servo", "--checkpoint", demo / "train", "--goal", cut, "--out", tmp_path / "x"),
+        ("train", "--from-mcap", tmp_path, "--out", tmp_path / "y"),
+        ("play", cut, "--save", tmp_path / "z.rrd"),
+    ):
+        message = refusal(*arguments)
+        assert message.startswith(f"dnet: {cut} ")
+        assert "cut off" in message
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.mcap"]
+    assert len(cut.read_bytes()) == len(whole) // 2
+
+
+def test_a_checkpoint_of_another_network_is_refused(demo: Path, tmp_path: Path) -> None:
+    from safetensors.numpy import save_file
+
+    other = tmp_path / "best.safetensors"
+    save_file({"weight": np.zeros(3, np.float32)}, other)
+    message = refusal(
+        "servo", "--checkpoint", other, "--goal", demo / "data" / "episode-0-00000.mcap",
+        "--out", tmp_path / "x",
+    )  # fmt: skip
+    assert str(other) in message
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_goal_of_another_size_is_refused(demo: Path, tmp_path: Path) -> None:
+    main(["record", str(tmp_path / "few"), "--pairs", "1", "--shapes", "1", "--points", "512"])
+    message = refusal(
+        "servo", "--checkpoint", demo / "train", "--goal",
+        tmp_path / "few" / "episode-0-00000.mcap", "--out", tmp_path / "x",
+    )  # fmt: skip
+    assert "takes clouds of 2048 points, the goal has 512" in message
+
+
+def test_training_over_a_run_is_refused(demo: Path) -> None:
+    before = (demo / "train" / "best.safetensors").read_bytes()
+    message = refusal("train", "--from-mcap", demo / "data", "--out", demo / "train")
+    assert "already holds a run" in message
+    assert (demo / "train" / "best.safetensors").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "frame"),
+    [
+        ("a/b.mcap:7", "a/b.mcap", 7),
+        ("a/b.mcap", "a/b.mcap", None),
+        ("c:/b.mcap", "c:/b.mcap", None),
+    ],
+)
+def test_a_goal_is_a_file_and_perhaps_a_frame(text: str, path: str, frame: int | None) -> None:
+    assert split_goal(text) == (Path(path), frame)

@@ -1,0 +1,35 @@
+"""What a Rerun recording holds, read by Rerun's own reader."""
+
+from pathlib import Path
+from typing import Any
+
+from rerun.chunk import RrdReader
+
+
+def rows(path: Path, entity: str, component: str, *, timeline: str | None) -> list[tuple[Any, Any]]:
+    """Return time and value of every row of a component, in time order; None for static ones.
+
+    Times of the simulation are in seconds.
+    """
+    found: list[tuple[Any, Any]] = []
+    for chunk in RrdReader(path).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        names = batch.schema.names
+        if str(chunk.entity_path) != entity or component not in names:
+            continue
+        values = batch.column(component).to_pylist()
+        if timeline is None:
+            found += [(None, value) for value in values if chunk.is_static]
+        elif timeline in names:
+            times = batch.column(timeline).to_pylist()
+            found += zip(map(_plain, times), values, strict=True)
+    return found if timeline is None else sorted(found, key=lambda row: row[0])
+
+
+def entities(path: Path) -> set[str]:
+    """Return the paths of all entities."""
+    return {str(chunk.entity_path) for chunk in RrdReader(path).stream().to_chunks()}
+
+
+def _plain(time: Any) -> float:
+    return float(time.total_seconds()) if hasattr(time, "total_seconds") else float(time)

@@ -1,0 +1,146 @@
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dnet.datasets.reader import EpisodeReader
+from dnet.errors import BadEpisode, MissingPath, NoPicture, OccupiedOutput, TooFew, UnknownRecording
+from dnet.recorders.playback import play
+from dnet.recorders.replay import RecordedEpisode
+from tests.recorders.rollout import frames, write, write_servo
+from tests.recorders.rrd import rows
+
+Box = tuple[float, float, float, float]
+
+
+def share(picture: Path, low: tuple[int, int, int], high: tuple[int, int, int], box: Box) -> float:
+    """Return the share of pixels between two colours in a part of a picture."""
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    height, width, _ = pixels.shape
+    left, top, right, bottom = box
+    part = pixels[int(top * height) : int(bottom * height), int(left * width) : int(right * width)]
+    return float(((part >= low) & (part <= high)).all(axis=2).mean())
+
+
+SCENE: Box = (0.0, 0.1, 0.6, 0.95)
+UPPER_LEFT: Box = (0.0, 0.1, 0.3, 0.4)
+UPPER_RIGHT: Box = (0.3, 0.1, 0.6, 0.4)
+NOTICES: Box = (0.78, 0.0, 1.0, 0.03)
+BLUE = (40, 80, 150), (120, 180, 255)
+GREEN = (20, 110, 40), (90, 220, 120)
+STEEL = (110, 110, 110), (240, 240, 240)
+
+
+def test_a_picture_shows_the_object_the_goal_and_both_arms(tmp_path: Path) -> None:
+    episode = write(tmp_path / "a.mcap", frames(3, points=1024))
+    picture = tmp_path / "new" / "a.png"
+    play([episode], open_episode=EpisodeReader, screenshot=picture)
+    assert share(picture, *BLUE, SCENE) > 0.005
+    assert share(picture, *GREEN, SCENE) > 0.005
+    assert share(picture, *STEEL, UPPER_LEFT) > 0.01
+    assert share(picture, *STEEL, UPPER_RIGHT) > 0.01
+    assert share(picture, *STEEL, NOTICES) < 0.01
+
+
+def test_a_saved_recording_holds_the_episode(tmp_path: Path) -> None:
+    seen = frames(3)
+    saved = tmp_path / "new" / "a.rrd"
+    play([write(tmp_path / "a.mcap", seen)], open_episode=EpisodeReader, save=saved)
+    assert len(rows(saved, "/cloud/current", "Points3D:positions", timeline="frame")) == len(seen)
+
+
+def test_an_existing_recording_is_not_overwritten(tmp_path: Path) -> None:
+    episode = write(tmp_path / "a.mcap", frames(2))
+    saved = tmp_path / "a.rrd"
+    saved.write_bytes(b"older")
+    with pytest.raises(OccupiedOutput):
+        play([episode], open_episode=EpisodeReader, save=saved)
+    assert saved.read_bytes() == b"older"
+
+
+def test_unfinished_recordings_play_too(tmp_path: Path) -> None:
+    episode = write_servo(tmp_path / "a.mcap")
+    play([episode], open_episode=EpisodeReader, save=tmp_path / "a.rrd")
+    for name in ("a.mcap", "a.rrd"):
+        part = tmp_path / f"{name}.part"
+        shutil.copyfile(tmp_path / name, part)
+        play([part], open_episode=EpisodeReader, save=tmp_path / f"of-{name}.rrd")
+        found = rows(
+            tmp_path / f"of-{name}.rrd", "/cloud/current", "Points3D:positions", timeline="frame"
+        )
+        assert len(found) == 3
+
+
+def test_an_episode_is_closed_whatever_comes(tmp_path: Path) -> None:
+    opened: list[EpisodeReader] = []
+
+    def open_episode(path: Path) -> RecordedEpisode:
+        opened.append(EpisodeReader(path))
+        return opened[-1]
+
+    play(
+        [write(tmp_path / "a.mcap", frames(2))], open_episode=open_episode, save=tmp_path / "a.rrd"
+    )
+    with pytest.raises(ValueError, match="released"):
+        opened[0].lines()
+
+
+def test_several_files_open_in_one_viewer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    seen = tmp_path / "seen"
+    viewer = tmp_path / "viewer"
+    viewer.write_text(
+        f'#!/bin/sh\nfor a in "$@"; do case $a in *.rrd) cp --backup=numbered $a {seen};; esac; done\n'
+    )
+    viewer.chmod(0o755)
+    seen.mkdir()
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setenv("RERUN_CLI_PATH", str(viewer))
+    for place in ("one", "two"):
+        write(tmp_path / place / "a.mcap", frames(2))
+    files = [tmp_path / "one" / "a.mcap", tmp_path / "two" / "a.mcap"]
+    play(files, open_episode=EpisodeReader)
+    assert sorted(path.name for path in seen.iterdir()) == ["a.rrd", "a.rrd.~1~"]
+
+
+def test_nothing_to_play_is_refused() -> None:
+    with pytest.raises(TooFew):
+        play([], open_episode=EpisodeReader)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a", "a.mcap.zip", "a.part"])
+def test_other_files_are_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(UnknownRecording, match=r"not in \.mcap or \.rrd"):
+        play([tmp_path / name], open_episode=EpisodeReader)
+
+
+def test_a_missing_file_is_named_and_its_unfinished_one_is_offered(tmp_path: Path) -> None:
+    with pytest.raises(MissingPath, match=r"a\.mcap does not exist; `dnet inspect ls"):
+        play([tmp_path / "a.mcap"], open_episode=EpisodeReader)
+    (tmp_path / "a.mcap.part").touch()
+    with pytest.raises(MissingPath, match=r"did not finish; play what there is of it as .*\.part"):
+        play([tmp_path / "a.mcap"], open_episode=EpisodeReader)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"), [("a.mcap", "not an MCAP file"), ("a.rrd", "not a Rerun recording")]
+)
+def test_a_name_alone_makes_no_recording(tmp_path: Path, name: str, why: str) -> None:
+    (tmp_path / name).write_bytes(b"something else altogether")
+    with pytest.raises(BadEpisode, match=why):
+        play([tmp_path / name], open_episode=EpisodeReader)
+
+
+def test_no_picture_is_left_where_none_was_drawn(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("RERUN_CLI_PATH", "/bin/false")
+    with pytest.raises(NoPicture):
+        play(
+            [write(tmp_path / "a.mcap", frames(2))],
+            open_episode=EpisodeReader,
+            screenshot=tmp_path / "a.png",
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]

@@ -1,0 +1,41 @@
+"""Data frames as tables on a terminal, or whole and unwrapped in a pipe."""
+
+import polars as pl
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+DECIMALS = {"x": 4, "y": 4, "z": 4}
+"""Digits after the point by column; two for the others."""
+WRAPPED = ("note",)
+"""Columns of prose: these give way on a narrow terminal."""
+UNWRAPPED_WIDTH = 2000
+
+
+def print_table(frame: pl.DataFrame) -> None:
+    """Print `frame` whole, numbers to the right."""
+    console = Console()
+    if not console.is_terminal:
+        # What is piped into another program must not be cut to a guessed width.
+        console = Console(width=UNWRAPPED_WIDTH)
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for name, kind in frame.schema.items():
+        table.add_column(
+            name,
+            justify="right" if kind.is_numeric() else "left",
+            no_wrap=name not in WRAPPED,
+            overflow="fold",
+        )
+    for row in frame.iter_rows(named=True):
+        table.add_row(*(Text(_cell(name, value)) for name, value in row.items()))
+    console.print(table)
+
+
+def _cell(name: str, value: object) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{DECIMALS.get(name, 2)}f}"
+    return str(value)
