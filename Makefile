@@ -3,6 +3,7 @@ SHELL := /bin/bash
 PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
+INSTALL := $(BIN)/pip install --quiet -c constraints.txt
 TORCH := $(shell sed -n 's/^torch==//p' constraints.txt)
 # The CPU build of torch is 200 MB instead of several GB; a machine with an NVIDIA GPU gets CUDA's.
 TORCH_CPU_INDEX := https://download.pytorch.org/whl/cpu
@@ -11,25 +12,31 @@ LIBRARIES := libusb-1.0-0 libgl1 libegl1 libgomp1 mesa-vulkan-drivers libxkbcomm
 	libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup libraries demo test check format lint type layers build benchmark clean
+.PHONY: help setup develop libraries demo test check format lint type layers build benchmark clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 
-setup: $(VENV)/.installed libraries ## Make .venv with locked dependencies; again: nothing
+setup: $(VENV)/.run libraries ## Make .venv with what dnet needs to run; again: nothing
 
-$(VENV)/.installed: pyproject.toml constraints.txt
+$(VENV)/.run: pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not here: apt-get install python3.11 python3.11-venv, or make PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then \
-		$(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)"; \
+		$(INSTALL) "torch==$(TORCH)"; \
 	else \
-		$(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)+cpu" 2>/dev/null \
-		|| $(BIN)/pip install --quiet -c constraints.txt --extra-index-url $(TORCH_CPU_INDEX) "torch==$(TORCH)+cpu" \
-		|| $(BIN)/pip install --quiet -c constraints.txt "torch==$(TORCH)"; \
+		$(INSTALL) "torch==$(TORCH)+cpu" 2>/dev/null \
+		|| $(INSTALL) --extra-index-url $(TORCH_CPU_INDEX) "torch==$(TORCH)+cpu" \
+		|| $(INSTALL) "torch==$(TORCH)"; \
 	fi
-	$(BIN)/pip install --quiet -c constraints.txt -e ".[dev]"
+	$(INSTALL) -e .
 	@touch $@
+
+$(VENV)/.develop: $(VENV)/.run
+	$(INSTALL) -e ".[dev]"
+	@touch $@
+
+develop: setup $(VENV)/.develop ## The same, and what its tests and checks need
 
 libraries: ## Install the system libraries of Open3D and Rerun, or say what to run
 	@missing=""; for library in $(LIBRARIES); do \
@@ -51,7 +58,7 @@ libraries: ## Install the system libraries of Open3D and Rerun, or say what to r
 demo: setup ## Record, train, servo and play on a small scale; results in demo/
 	$(BIN)/dnet demo
 
-test: setup ## Run the checks and the tests
+test: develop ## Run the checks and the tests
 	$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest
 
@@ -67,15 +74,15 @@ lint:
 
 type:
 	$(BIN)/mypy
-	$(BIN)/pyright
+	$(BIN)/pyright --pythonpath $(BIN)/python
 
 layers:
 	$(BIN)/lint-imports
 
-build: setup ## Build the wheel and the sdist into dist/
+build: develop ## Build the wheel and the sdist into dist/
 	$(BIN)/python -m build
 
-benchmark: setup ## Measure speed against peers, as ratios
+benchmark: develop ## Measure speed against peers, as ratios
 	$(BIN)/python -m pytest tests/benchmarks -s
 
 clean: ## Remove .venv, build products and caches

@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Union
+from typing import Annotated, Any, Union
 
 import tyro
 
@@ -48,7 +48,7 @@ def parse(arguments: Sequence[str]) -> Command:
         description = None if named else first_line
         return Annotated[command, tyro.conf.subcommand(name, description=description)]
 
-    union = Union[tuple(described(*entry) for entry in COMMANDS.items())]  # noqa: UP007
+    union: Any = Union[tuple(described(*entry) for entry in COMMANDS.items())]  # noqa: UP007
     chosen: Command = tyro.cli(union, prog="dnet", description=DESCRIPTION, args=arguments)
     return chosen
 

@@ -183,7 +183,7 @@ class NoPicture(DnetError, RuntimeError):
 
     def __init__(self, path: Path, tries: int, why: str) -> None:
         super().__init__(
-            f"the viewer drew no picture of {path} in {tries} tries ({why}); without a screen it "
+            f"the viewer drew no {path} in {tries} tries ({why}); without a screen it "
             "needs a software renderer: on Debian, apt-get install mesa-vulkan-drivers libegl1 "
             "libxkbcommon0 libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2"
         )

@@ -5,12 +5,10 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from dnet.errors import BadEpisode, MissingPath, OccupiedOutput, TooFew, UnknownRecording
+from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording
 from dnet.recorders.replay import OpenEpisode, replay
+from dnet.recorders.salvage import whole_recording
 from dnet.recorders.viewer import draw, show
-
-RRD_MAGICS = (b"RRF2", b"RRIO")
-"""How Rerun's files begin; the second is of versions that this one cannot read."""
 
 
 def play(
@@ -65,17 +63,14 @@ def play(
 def _recording(file: Path, place: Path, open_episode: OpenEpisode) -> tuple[Path, float | None]:
     """Return `file` as an `.rrd`, and the time that shows it best if that is known."""
     name = file.name.removesuffix(".part")
+    if name.endswith(".rrd"):
+        return whole_recording(file, place), None
     copy = place / Path(name).with_suffix(".rrd").name
-    if name.endswith(".mcap"):
-        episode = open_episode(file)
-        try:
-            return copy, replay(episode, copy)
-        finally:
-            episode.close()
-    if name == file.name:
-        return file, None
-    shutil.copyfile(file, copy)
-    return copy, None
+    episode = open_episode(file)
+    try:
+        return copy, replay(episode, copy)
+    finally:
+        episode.close()
 
 
 def _check(file: Path) -> None:
@@ -87,8 +82,3 @@ def _check(file: Path) -> None:
         if (part := file.with_name(file.name + ".part")).is_file():
             hint = f"its recording did not finish; play what there is of it as {part}"
         raise MissingPath(file, "recording", hint)
-    if name.endswith(".rrd"):
-        with file.open("rb") as start:
-            magic = start.read(4)
-        if magic not in RRD_MAGICS:
-            raise BadEpisode(file, "is not a Rerun recording", "give an .rrd of `dnet servo`")

@@ -67,7 +67,7 @@ def draw(file: Path, picture: Path, *, seconds: float | None) -> None:
         picture.parent.mkdir(parents=True, exist_ok=True)
         picture.write_bytes(content)
         return
-    raise NoPicture(file, TRIES, why)
+    raise NoPicture(picture, TRIES, why)
 
 
 def _draw_once(file: Path, seconds: float | None) -> bytes:

@@ -150,6 +150,9 @@ def test_a_file_that_is_no_episode_is_refused(
     assert not (tmp_path / "x.rrd").exists()
 
 
-def test_a_demo_over_a_demo_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    assert "already holds a demo (data/)" in refused(capsys, "demo", "--out", tmp_path)
+def test_a_demo_over_another_demo_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "demo.json").write_text('{"options": {"pairs": 99}, "seconds": {}}')
+    message = refused(capsys, "demo", "--out", tmp_path)
+    assert "already holds a demo with other options ({'pairs': 99})" in message

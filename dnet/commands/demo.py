@@ -1,11 +1,7 @@
 """`dnet demo`: the whole chain on a small scale, each step with the command that does it."""
 
-import shlex
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING
 
 from dnet.commands.inspect import Info, Inspect, List
 from dnet.commands.play import Play
@@ -13,29 +9,25 @@ from dnet.commands.record import Record
 from dnet.commands.servo import Servo
 from dnet.commands.train import Train
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    Command = Record | Train | Servo | Play | Inspect
-
 
 @dataclass(frozen=True)
 class Demo:
     """Record, train, servo and play on a small scale, and show the command behind each step.
 
     The goal of the servo run is a shape of an episode that the network was not trained on. A
-    table at the end says what came out; the files stay for `dnet play` and `dnet inspect`.
+    table at the end says what came out; the files stay for `dnet play` and `dnet inspect`. Called
+    again, it goes on after the last step that was finished.
 
     Example: dnet demo --out demo
     """
 
     out: Path = Path("demo")
-    """Directory for everything; made if need be, must hold no demo yet."""
-    pairs: int = 5
+    """Directory for everything; made if need be."""
+    pairs: int = 6
     """Episodes to record."""
     shapes: int = 20
     """Shapes an episode."""
-    minutes: float = 2.0
+    minutes: float = 2.5
     """Time to train."""
     seed: int = 0
     """Of everything drawn at random."""
@@ -44,58 +36,43 @@ class Demo:
         """Run the chain.
 
         Raises:
-            OccupiedOutput: If the directory holds a demo already.
+            OccupiedOutput: If the directory holds a demo with other options.
             DnetError: If a step fails.
         """
         from rich.console import Console  # noqa: PLC0415
 
-        from dnet.commands.demo_summary import held_out_goal, summary  # noqa: PLC0415
-        from dnet.errors import OccupiedOutput  # noqa: PLC0415
+        from dnet.commands.demo_steps import Steps, held_out_goal, summary  # noqa: PLC0415
 
-        data, run, servo = self.out / "data", self.out / "train", self.out / "servo"
-        for held in (data, run, servo):
-            if held.exists():
-                raise OccupiedOutput(self.out, f"a demo ({held.name}/)")
-        console = Console(stderr=True)
-        seconds: dict[str, float] = {}
-
-        def step(name: str, line: str, command: "Command") -> None:
-            seconds[name] = _timed(console, line, command.run)
-
-        step(
+        console = Console()
+        steps = Steps(self.out, {**asdict(self), "out": str(self.out)}, console)
+        data, train, servo = self.out / "data", self.out / "train", self.out / "servo"
+        steps.run(
             "record",
             f"dnet record {data} --pairs {self.pairs} --shapes {self.shapes} --seed {self.seed}",
             Record(data, pairs=self.pairs, shapes=self.shapes, seed=self.seed),
         )
-        step("inspect", f"dnet inspect ls {data}", Inspect(List(data)))
-        step(
+        steps.run("list", f"dnet inspect ls {data}", Inspect(List(data)))
+        steps.run(
             "train",
-            f"dnet train --from-mcap {data} --out {run} --minutes {self.minutes} "
+            f"dnet train --from-mcap {data} --out {train} --minutes {self.minutes} "
             f"--seed {self.seed}",
-            Train(data, run, minutes=self.minutes, seed=self.seed),
+            Train(data, train, minutes=self.minutes, seed=self.seed),
         )
-        goal = held_out_goal(data, run)
-        step(
+        goal, frame = held_out_goal(data, train)
+        steps.run(
             "servo",
-            f"dnet servo --checkpoint {run} --goal {goal} --out {servo}",
-            Servo(run, goal, servo),
+            f"dnet servo --checkpoint {train} --goal {goal}:{frame} --out {servo}",
+            Servo(train, f"{goal}:{frame}", servo),
         )
-        step("look", f"dnet inspect info {servo / 'run.mcap'}", Inspect(Info(servo / "run.mcap")))
-        for source, picture in (
-            (servo / "run.rrd", self.out / "servo.png"),
-            (Path(goal.rsplit(":", 1)[0]), self.out / "episode.png"),
+        run = servo / "run.mcap"
+        steps.run("describe", f"dnet inspect info {run}", Inspect(Info(run)))
+        for name, source, picture in (
+            ("picture of the run", servo / "run.rrd", self.out / "servo.png"),
+            ("picture of the goal", goal, self.out / "episode.png"),
         ):
-            step(
-                f"picture of {source.name}",
+            steps.run(
+                name,
                 f"dnet play {source} --screenshot {picture}",
                 Play((source,), screenshot=picture),
             )
-        console.print(summary(self.out, goal, seconds))
-
-
-def _timed(console: "Console", line: str, run: Callable[[], None]) -> float:
-    """Show a command, run it, and return how many seconds it took."""
-    console.print(f"\n[bold]$ {shlex.join(line.split())}[/bold]", highlight=False, soft_wrap=True)
-    start = perf_counter()
-    run()
-    return perf_counter() - start
+        console.print(summary(self.out, steps.seconds))

@@ -54,9 +54,10 @@ class Record:
             rejected = sum(self._episode(lab, index, bars, task) for index in range(self.pairs))
             seconds = bars.tasks[0].finished_time or bars.tasks[0].elapsed or 1.0
         shapes = self.pairs * self.shapes
-        console.print(
+        Console().print(
             f"{self.pairs} episodes with {shapes} shapes in {self.out} "
-            f"({shapes / seconds:.2f} shapes/s, {rejected} draws rejected)"
+            f"({shapes / seconds:.2f} shapes/s, {rejected} draws rejected)",
+            highlight=False,
         )
 
     def _check(self) -> None:

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,11 +59,11 @@ class Servo:
         self._check()
         model = load(self.checkpoint)
         goal, scene = self._read_goal(model.config.points)
-        console = Console(stderr=True)
+        console = Console()
         with laboratory(model.config.points) as lab:
             lab.world.reset(scene)
             lab.world.settle()
-            kinds: Iterator[FrameKind] = chain(["rest"], repeat("shape"))
+            kinds = _kinds()
             with ServoLog(self.out, self._meta(lab, goal, scene), lab, console) as log:
                 log.start(goal)
                 trace = servo(
@@ -119,6 +118,13 @@ class Servo:
         name = f"servo-{goal.source.replace('.mcap:', '-')}"
         settings = lab.describe() | {"goal": goal.source, "checkpoint": self.checkpoint.name}
         return EpisodeMeta(name, self.seed, 0, scene, settings)
+
+
+def _kinds() -> "Iterator[FrameKind]":
+    """Yield what each frame of a run is: it starts from rest."""
+    yield "rest"
+    while True:
+        yield "shape"
 
 
 def _summary(trace: "Trace") -> str:

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import torch
     from rich.console import Console
 
@@ -77,9 +75,7 @@ class Train:
         config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.points)
         writer = RunWriter(self.out, self._describe(division, config, settings))
         keep_pages()
-        training, validation = (
-            frames.to(device) for frames in _read(division, config, console=console)
-        )
+        training, validation = _read(division, config, seed=self.seed, console=console)
         model = new_network(config, seed=self.seed).to(device)
         show_data(console, division, training)
         result = self._fit(
@@ -174,19 +170,30 @@ class Train:
 
 
 def _read(
-    division: "Division", config: "DeformerNetConfig", *, console: "Console"
-) -> "Iterator[Frames]":
-    """Yield the training and the validation frames, with a progress bar."""
+    division: "Division", config: "DeformerNetConfig", *, seed: int, console: "Console"
+) -> "tuple[Frames, Frames]":
+    """Return the training and the validation frames, with a progress bar."""
     from dnet.commands.progress import progress  # noqa: PLC0415
     from dnet.training.episodes import open_each  # noqa: PLC0415
-    from dnet.training.frames import read_frames  # noqa: PLC0415
+    from dnet.training.frames import read_frames, samplings_for  # noqa: PLC0415
 
-    parts = (division.training, division.validation)
+    learned, judged = (
+        sum(survey.frames for survey in part) for part in (division.training, division.validation)
+    )
     with progress(console, "clouds") as bar:
-        total = sum(survey.frames for part in parts for survey in part)
-        task = bar.add_task("finding neighbours", total=total)
-        for part in parts:
-            yield read_frames(open_each(part), config, on_cloud=lambda: bar.advance(task))
+        task = bar.add_task("finding neighbours", total=learned + judged)
+
+        def advance() -> None:
+            bar.advance(task)
+
+        training = read_frames(
+            open_each(division.training),
+            config,
+            samplings=samplings_for(learned),
+            seed=seed,
+            on_cloud=advance,
+        )
+        return training, read_frames(open_each(division.validation), config, on_cloud=advance)
 
 
 def _closing_line(result: "Result", out: Path) -> str:

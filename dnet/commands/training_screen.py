@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.progress import (
@@ -51,7 +50,7 @@ class TrainingBar:
         )
         self._task = self._progress.add_task("", total=1.0, epoch="", loss="", validation="")
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "TrainingBar":
         self._progress.start()
         return self
 
@@ -99,6 +98,6 @@ def _cells(scores: Scores) -> tuple[str, ...]:
         str(scores.pairs),
         f"{scores.mse_mm2:.2f}",
         f"{scores.mean_mm:.2f}",
-        f"{scores.r2:.3f}",
+        "-" if scores.r2 is None else f"{scores.r2:.3f}",
         f"{scores.zero_mse_mm2:.1f}",
     )

@@ -2,6 +2,7 @@
 
 import fpsample
 import numpy as np
+from jaxtyping import Int64
 
 from dnet.errors import BadCloud, ShortCloud
 from dnet.types import Cloud
@@ -22,10 +23,15 @@ def farthest_points(cloud: Cloud, count: int, *, start: int = 0) -> Cloud:
         ShortCloud: If the cloud has fewer than `count` points.
         BadCloud: If a coordinate is NaN or infinite.
     """
+    return cloud[farthest_rows(cloud, count, start=start)]
+
+
+def farthest_rows(cloud: Cloud, count: int, *, start: int = 0) -> Int64[np.ndarray, "{count}"]:
+    """Return the rows of `farthest_points(cloud, count, start=start)`, which see."""
     if len(cloud) < count:
         raise ShortCloud(len(cloud), count)
     bad = int((~np.isfinite(cloud).all(axis=1)).sum())
     if bad:
         raise BadCloud("cloud", bad, len(cloud))
-    chosen = fpsample.fps_sampling(cloud, count, start_idx=start)
-    return cloud[np.asarray(chosen, dtype=np.intp)]
+    rows = fpsample.fps_sampling(cloud, count, start_idx=start)
+    return np.asarray(rows, dtype=np.int64)

@@ -24,21 +24,26 @@ class Arm(Protocol):
     @property
     def lower(self) -> Joints:
         """Least joint positions."""
+        ...
 
     @property
     def upper(self) -> Joints:
         """Greatest joint positions."""
+        ...
 
     @property
     def velocity(self) -> Joints:
         """Greatest joint velocities."""
+        ...
 
     @property
     def acceleration(self) -> Joints:
         """Greatest joint accelerations."""
+        ...
 
     def forward(self, joints: Joints) -> Pose:
         """Return the pose of the tip in the world."""
+        ...
 
     def inverse(self, tip: Pose, *, near: Joints) -> Joints:
         """Return joint positions for a pose of the tip, the nearest to `near`.
@@ -46,6 +51,7 @@ class Arm(Protocol):
         Raises:
             Unreachable: If there are none within the limits.
         """
+        ...
 
 
 @runtime_checkable
@@ -54,6 +60,8 @@ class Surroundings(Protocol):
 
     def stand(self, holding: Joints) -> None:
         """Take note of where the holding arm stands."""
+        ...
 
     def obstacle(self, joints: Joints) -> str | None:
         """Return what the arm would touch at `joints` and with which link, or None."""
+        ...

@@ -42,18 +42,19 @@ def straight_line(arm: Arm, obstacle: Obstacle, start: Joints, displacement: Poi
     for step in range(1, count + 1):
         target = tip.copy()
         target[:3, 3] += displacement * step / count
-        stop = ""
         try:
             joints = arm.inverse(target, near=path[-1])
         except Unreachable as error:
-            stop = str(error)
-        else:
-            jump = float(np.linalg.norm((joints - path[-1]) * METRES_PER_UNIT))
-            if jump > LARGEST_JUMP:
-                stop = f"the joints would jump by {jump * 1e3:.0f} mm of tip motion"
-            else:
-                stop = obstacle(joints) or ""
+            return Line(np.array(path), (step - 1) / count, str(error))
+        stop = _jump(path[-1], joints) or obstacle(joints)
         if stop:
             return Line(np.array(path), (step - 1) / count, stop)
         path.append(joints)
     return Line(np.array(path), 1.0, "")
+
+
+def _jump(before: Joints, after: Joints) -> str | None:
+    jump = float(np.linalg.norm((after - before) * METRES_PER_UNIT))
+    if jump > LARGEST_JUMP:
+        return f"the joints would jump by {jump * 1e3:.0f} mm of tip motion"
+    return None

@@ -4,6 +4,7 @@ Kuffner and LaValle 2000, as in Sucan, Moll and Kavraki's Open Motion Planning L
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from ompl import base, geometric
@@ -47,10 +48,10 @@ def rrt_connect(
     Returns:
         Joint positions, (n, 6), n >= 2.
     """
-    made = 0
+    made = 0  # States and paths are Any: OMPL's stubs know only their abstract bases.
     size = len(start)
 
-    def valid(state: base.State) -> bool:
+    def valid(state: Any) -> bool:
         nonlocal made
         made += 1
         # OMPL takes nothing but Python's own bool here.
@@ -67,10 +68,10 @@ def rrt_connect(
     information.setStateValidityCheckingResolution(RESOLUTION / space.getMaximumExtent())
     information.setup()
 
-    def state(joints: Joints) -> base.State:
-        made_state = information.allocState()
-        made_state[0:size] = (joints * METRES_PER_UNIT).tolist()
-        return made_state
+    def state(joints: Joints) -> Any:
+        allocated: Any = information.allocState()
+        allocated[0:size] = (joints * METRES_PER_UNIT).tolist()
+        return allocated
 
     _seed(seed)
     problem = base.ProblemDefinition(information)
@@ -83,7 +84,7 @@ def rrt_connect(
     # An approximate solution counts as true, too: only an exact one will do.
     if status.getStatus() != base.PlannerStatus.EXACT_SOLUTION:
         return None
-    path = problem.getSolutionPath()
+    path: Any = problem.getSolutionPath()
     simplifier = geometric.PathSimplifier(information)
     for _ in range(PASSES):
         simplifier.reduceVertices(path)

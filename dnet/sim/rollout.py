@@ -24,6 +24,7 @@ class Planner(Protocol):
 
     def plan(self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int) -> Plan:
         """Return how to move the tip by `displacement` from where both arms stand."""
+        ...
 
 
 class Rollout:

@@ -33,34 +33,44 @@ class World(Protocol):
             Unreachable: If an arm cannot reach its point.
             EmptyGrasp: If nothing is between the jaws there.
         """
+        ...
 
     def restore(self) -> None:
         """Put the object back at rest and the arms where they grasped it; the clock goes on."""
+        ...
 
     @property
     def time(self) -> float:
         """Seconds of simulation since the reset."""
+        ...
 
     @property
     def joints(self) -> tuple[Joints, Joints]:
         """Joint positions of the holding and the moving arm."""
+        ...
 
     @property
     def tip(self) -> Point:
         """Where the moving arm's jaws meet, in the world."""
+        ...
 
     @property
     def object_id(self) -> int:
         """The object's number in the mask of a depth image."""
+        ...
 
     def nodes(self) -> Nodes:
         """Return the mesh nodes, in metres, (n, 3)."""
+        ...
 
     def follow(self, path: JointPath, times: Float64[np.ndarray, "_"]) -> None:
         """Drive the moving arm along a timed joint path; what it grasps goes with it."""
+        ...
 
     def settle(self) -> Settling:
         """Let the object come to rest with the arms still."""
+        ...
 
     def look(self) -> DepthImage:
         """Return what the depth camera sees."""
+        ...

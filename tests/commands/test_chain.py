@@ -1,4 +1,4 @@
-"""The whole chain on a tiny scale: record, train, servo, look; each part takes what the last left."""
+"""The whole chain on a tiny scale: each part takes what the part before it left."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import save_file
 
 from dnet.cli import main
 from dnet.commands.servo import split_goal
@@ -42,6 +43,17 @@ def test_the_demo_leaves_everything_it_names(demo: Path) -> None:
     assert not list(demo.rglob("*.part"))
 
 
+def test_a_second_call_of_the_demo_does_nothing_twice(
+    demo: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.stat().st_mtime_ns for path in demo.rglob("*")}
+    main(["demo", "--out", str(demo), "--pairs", "2", "--shapes", "3", "--minutes", "0.1"])
+    assert {path: path.stat().st_mtime_ns for path in demo.rglob("*")} == before
+    printed = capsys.readouterr().out
+    assert printed.count("done before") == printed.count("$ dnet") == 7
+    assert "together" in printed
+
+
 def test_a_servo_run_is_an_episode_whose_figures_follow_from_its_clouds(demo: Path) -> None:
     with EpisodeReader(demo / "servo" / "run.mcap") as run:
         assert run.finished
@@ -73,7 +85,9 @@ def test_rerun_accepts_the_recording_and_the_episode(demo: Path) -> None:
         ["rrd", "verify", demo / "servo" / "run.rrd"],
         ["mcap", "check", "--full", demo / "servo" / "run.mcap"],
     ):
-        ran = subprocess.run([RERUN, *arguments], capture_output=True, text=True, check=False)
+        ran = subprocess.run(
+            [RERUN, *map(str, arguments)], capture_output=True, text=True, check=False
+        )
         assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
@@ -119,8 +133,6 @@ def test_an_episode_cut_off_in_the_middle_is_refused(demo: Path, tmp_path: Path)
 
 
 def test_a_checkpoint_of_another_network_is_refused(demo: Path, tmp_path: Path) -> None:
-    from safetensors.numpy import save_file
-
     other = tmp_path / "best.safetensors"
     save_file({"weight": np.zeros(3, np.float32)}, other)
     message = refusal(

@@ -35,7 +35,9 @@ def test_a_run_is_drawn_at_a_given_time(tmp_path: Path, capsys: pytest.CaptureFi
         assert picture.format == "PNG"
         assert picture.size == (1600, 900)
         # Many colours: points, arms and curves, not an empty window.
-        assert len(picture.convert("RGB").getcolors(1600 * 900)) > 500
+        colors = picture.convert("RGB").getcolors(1600 * 900)
+        assert colors is not None
+        assert len(colors) > 500
 
 
 def test_an_episode_is_saved_for_another_machine(

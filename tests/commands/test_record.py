@@ -68,7 +68,7 @@ def test_pairs_differ(recorded: Path) -> None:
 def test_the_same_seed_writes_the_same_bytes_in_another_process(
     recorded: Path, tmp_path: Path
 ) -> None:
-    arguments = ["record", tmp_path / "again", "--pairs", "2", "--shapes", "2", "--seed", "4"]
+    arguments = ["record", str(tmp_path / "again"), "--pairs", "2", "--shapes", "2", "--seed", "4"]
     subprocess.run([DNET, *arguments], check=True, capture_output=True)
     for path in sorted(recorded.iterdir()):
         assert (tmp_path / "again" / path.name).read_bytes() == path.read_bytes()

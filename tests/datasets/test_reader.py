@@ -149,10 +149,12 @@ def test_a_frame_that_is_not_there_is_refused(tmp_path: Path, index: int) -> Non
 
 
 def test_a_reader_travels_between_processes(tmp_path: Path) -> None:
-    with EpisodeReader(write(tmp_path / "a.mcap", frames(2))) as episode:
-        with pickle.loads(pickle.dumps(episode)) as other:  # noqa: S301
-            assert other.meta == episode.meta
-            np.testing.assert_array_equal(other.cloud(1), episode.cloud(1))
+    with (
+        EpisodeReader(write(tmp_path / "a.mcap", frames(2))) as episode,
+        pickle.loads(pickle.dumps(episode)) as other,  # noqa: S301
+    ):
+        assert other.meta == episode.meta
+        np.testing.assert_array_equal(other.cloud(1), episode.cloud(1))
 
 
 FRAME_TOPICS = [

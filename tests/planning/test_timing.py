@@ -1,5 +1,7 @@
 """Timed paths keep every limit, stay on the polyline, and start and end at rest."""
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -41,9 +43,7 @@ def test_samples_stay_on_the_polyline_and_pass_its_waypoints(offset: np.ndarray)
     np.testing.assert_allclose(joints[-1], path[-1], atol=1e-9 / METRES_PER_UNIT.min())
     scaled, corners = joints * METRES_PER_UNIT, path * METRES_PER_UNIT
     for point in scaled:
-        assert (
-            min(_distance(point, a, b) for a, b in zip(corners, corners[1:], strict=False)) < 1e-7
-        )
+        assert min(_distance(point, a, b) for a, b in pairwise(corners)) < 1e-7
     for corner in corners:
         assert np.linalg.norm(scaled - corner, axis=1).min() < 1e-7
 

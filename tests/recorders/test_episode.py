@@ -223,15 +223,17 @@ def test_an_interrupted_episode_keeps_its_frames_under_its_part_name(
 ) -> None:
     path = tmp_path / "a.mcap"
     seen = frames(3)
-    with (
-        pytest.raises(type(trouble)),
-        EpisodeWriter(path, meta(), arms=ARMS, attachments={"a.txt": b"x"}) as writer,
-    ):
-        for one in seen:
-            writer.add(one)
-        raise trouble
-    assert not path.exists()
-    with EpisodeReader(writer.part) as episode:
+
+    def interrupted() -> None:
+        with EpisodeWriter(path, meta(), arms=ARMS, attachments={"a.txt": b"x"}) as writer:
+            for one in seen:
+                writer.add(one)
+            raise trouble
+
+    with pytest.raises(type(trouble)):
+        interrupted()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap.part"]
+    with EpisodeReader(tmp_path / "a.mcap.part") as episode:
         assert not episode.finished
         assert episode.result is None
         assert episode.meta == meta()

@@ -9,7 +9,9 @@ from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BadEpisode, MissingPath, NoPicture, OccupiedOutput, TooFew, UnknownRecording
 from dnet.recorders.playback import play
 from dnet.recorders.replay import RecordedEpisode
-from tests.recorders.rollout import frames, write, write_servo
+from dnet.recorders.rerun_run import RerunRun
+from dnet.sim.urdf import psm_urdf
+from tests.recorders.rollout import ARMS, frames, step, write, write_servo
 from tests.recorders.rrd import rows
 
 Box = tuple[float, float, float, float]
@@ -73,6 +75,21 @@ def test_unfinished_recordings_play_too(tmp_path: Path) -> None:
         assert len(found) == 3
 
 
+def test_what_a_killed_run_left_plays_too(tmp_path: Path) -> None:
+    seen = frames(2)
+    run = RerunRun(tmp_path / "run.rrd", name="run", arms=ARMS, urdf=psm_urdf())
+    run.log_step(0, step(seen[0], seen[-1]), None)
+    sound = len(run.part.read_bytes())
+    run.log_step(1, step(seen[-1], seen[-1]), None)
+    left = tmp_path / "left.rrd.part"
+    # The kill came in the middle of the second step.
+    left.write_bytes(run.part.read_bytes()[: sound + 3000])
+    run.close()
+    play([left], open_episode=EpisodeReader, save=tmp_path / "left.rrd")
+    found = rows(tmp_path / "left.rrd", "/cloud/current", "Points3D:positions", timeline="sim_time")
+    assert [time for time, _ in found] == [0.0]
+
+
 def test_an_episode_is_closed_whatever_comes(tmp_path: Path) -> None:
     opened: list[EpisodeReader] = []
 
@@ -91,7 +108,8 @@ def test_several_files_open_in_one_viewer(monkeypatch: pytest.MonkeyPatch, tmp_p
     seen = tmp_path / "seen"
     viewer = tmp_path / "viewer"
     viewer.write_text(
-        f'#!/bin/sh\nfor a in "$@"; do case $a in *.rrd) cp --backup=numbered $a {seen};; esac; done\n'
+        '#!/bin/sh\nfor a in "$@"; do case $a in '
+        f"*.rrd) cp --backup=numbered $a {seen};; esac; done\n"
     )
     viewer.chmod(0o755)
     seen.mkdir()

@@ -72,6 +72,9 @@ def test_no_child_of_the_viewer_outlives_it(tmp_path: Path, stubborn: str) -> No
         while not number.exists() and time.monotonic() < deadline:
             time.sleep(0.01)
     child = int(number.read_text())
+    deadline = time.monotonic() + 10
+    while alive(child) and time.monotonic() < deadline:
+        time.sleep(0.01)
     assert not alive(child)
 
 

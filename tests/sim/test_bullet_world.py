@@ -44,11 +44,13 @@ def test_what_the_jaws_hold_goes_with_them_and_the_held_end_stays(world: BulletW
     before, tip = world.nodes(), world.tip
     pull(world, [0.03, 0.01, 0.02])
     assert world.settle().settled
-    np.testing.assert_allclose(world.tip, tip + [0.03, 0.01, 0.02], atol=1e-9)
+    np.testing.assert_allclose(world.tip, tip + np.array([0.03, 0.01, 0.02]), atol=1e-9)
     moved = world.nodes() - before
     jaws = np.linalg.norm(before - tip, axis=1) < world.settings.jaw_radius
     assert jaws.sum() >= 4
-    np.testing.assert_allclose(moved[jaws], np.tile([0.03, 0.01, 0.02], (jaws.sum(), 1)), atol=2e-6)
+    np.testing.assert_allclose(
+        moved[jaws], np.tile([0.03, 0.01, 0.02], (int(jaws.sum()), 1)), atol=2e-6
+    )
     end = world.mesh.nodes[:, 0] == world.mesh.nodes[:, 0].min()
     np.testing.assert_allclose(moved[end], 0, atol=1e-7)
     assert np.linalg.norm(moved[~jaws & ~end], axis=1).max() > 0.01
@@ -94,8 +96,11 @@ def test_points_lie_on_the_surface_that_rays_meet(world: BulletWorld) -> None:
     image = world.look()
     cloud = unproject(image, image.mask == world.object_id)
     surface = open3d.t.geometry.RaycastingScene()
-    surface.add_triangles(world.nodes(), world.mesh.surface().astype(np.uint32))
-    distance = surface.compute_distance(open3d.core.Tensor(cloud)).numpy()
+    surface.add_triangles(
+        open3d.core.Tensor.from_numpy(world.nodes()),
+        open3d.core.Tensor.from_numpy(world.mesh.surface().astype(np.uint32)),
+    )
+    distance = surface.compute_distance(open3d.core.Tensor.from_numpy(cloud)).numpy()
     assert len(cloud) > 4096
     assert distance.max() < 5e-5
 

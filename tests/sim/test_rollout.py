@@ -14,7 +14,7 @@ from dnet.sim.clearance import Clearance
 from dnet.sim.rollout import Rollout
 from dnet.sim.scenes import SoftBox, Workspace, draw_displacement, draw_scene
 from dnet.sim.world import Settling
-from dnet.types import Cloud, Frame, JointPath, Joints, Nodes, Point, Scene
+from dnet.types import Cloud, Frame, JointPath, Joints, Nodes, Plan, Point, Scene
 
 
 def blind(image: DepthImage, object_id: int) -> Cloud:
@@ -80,9 +80,7 @@ class Moody:
         camera = Camera(width=1, height=1)
         return DepthImage(np.ones((1, 1), np.float32), np.zeros((1, 1), np.int32), camera)
 
-    def plan(self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int):  # type: ignore[no-untyped-def]
-        from dnet.types import Plan
-
+    def plan(self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int) -> Plan:
         path = np.concatenate([displacement, np.zeros(3)])[None]
         return Plan("straight", path, np.zeros(1), displacement, displacement, "", 1, 0.0)
 

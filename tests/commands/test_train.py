@@ -1,0 +1,161 @@
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from dnet.commands.train import Train
+from dnet.datasets.reader import EpisodeReader
+from dnet.errors import (
+    BadEpisode,
+    DnetError,
+    MissingPath,
+    NoDevice,
+    NoEpisodes,
+    NotAFraction,
+    OccupiedOutput,
+    TooFew,
+    TooShort,
+)
+from dnet.training.checkpoints import load
+from dnet.training.run import read_config
+from tests.recorders import rollout
+
+POINTS = 136
+
+
+@pytest.fixture(scope="module")
+def episodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("episodes")
+    for index in range(3):
+        seen = rollout.frames(5, seed=index, points=POINTS)
+        rollout.write(directory / f"episode-{index}.mcap", seen)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def run(episodes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("runs") / "small"
+    Train(from_mcap=episodes, out=out, epochs=3, device="cpu").run()
+    return out
+
+
+def test_a_run_leaves_its_config_its_metrics_and_two_networks(run: Path) -> None:
+    assert sorted(path.name for path in run.iterdir()) == [
+        "best.safetensors",
+        "config.json",
+        "last.safetensors",
+        "metrics.jsonl",
+    ]
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    assert [line["epoch"] for line in lines] == [1, 2, 3]
+    assert all(line["validation"]["any_pair"]["pairs"] == 20 for line in lines)
+
+
+def test_the_config_names_the_episodes_on_each_side(run: Path) -> None:
+    data = read_config(run)["data"]
+    assert len(data["validation"]) == 1
+    assert sorted(data["training"] + data["validation"]) == [f"episode-{i}" for i in range(3)]
+
+
+def test_the_best_network_has_the_error_that_the_metrics_say(run: Path, episodes: Path) -> None:
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    least = min(line["validation"]["any_pair"]["mse_mm2"] for line in lines)
+    model = load(run)
+    (held_out,) = read_config(run)["data"]["validation"]
+    with EpisodeReader(episodes / f"{held_out}.mcap") as episode:
+        shapes = [index for index, kind in enumerate(episode.kinds) if kind != "way"]
+        squares = [
+            np.square(
+                1000
+                * (
+                    model.predict(episode.cloud(current), episode.cloud(goal))
+                    - (episode.grasps[goal] - episode.grasps[current])
+                )
+            ).mean()
+            for current in shapes
+            for goal in shapes
+            if current != goal
+        ]
+    assert np.mean(squares) == pytest.approx(least, rel=1e-3)
+
+
+def test_the_same_seed_trains_the_same_network(run: Path, episodes: Path, tmp_path: Path) -> None:
+    Train(from_mcap=episodes, out=tmp_path / "again", epochs=3, device="cpu").run()
+    one, other = load(run).state_dict(), load(tmp_path / "again").state_dict()
+    assert all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_the_closing_table_and_the_data_are_told(
+    episodes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Train(from_mcap=episodes, out=tmp_path / "run", epochs=1, size="light", norm="batch").run()
+    told = capsys.readouterr()
+    assert "2 episodes to train on, 1 to validate on; 10 frames, 40 ordered pairs" in " ".join(
+        told.err.split()
+    )
+    assert "no motion" in told.out
+    assert "validation" in told.out
+    assert load(tmp_path / "run").config.norm == "batch"
+
+
+def test_time_limits_a_training_whatever_its_epochs(episodes: Path, tmp_path: Path) -> None:
+    Train(from_mcap=episodes, out=tmp_path / "run", epochs=10**6, minutes=0.01).run()
+    assert load(tmp_path / "run").config.points == POINTS
+
+
+def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError], str]]:
+    good = Train(from_mcap=episodes, out=tmp_path / "run")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    return [
+        (replace(good, from_mcap=tmp_path / "none"), MissingPath, "none does not exist"),
+        (replace(good, from_mcap=empty), NoEpisodes, "empty holds no .mcap episode"),
+        (replace(good, epochs=0), TooFew, "--epochs is 0, must be at least 1"),
+        (replace(good, seed=-1), TooFew, "--seed is -1, must be at least 0"),
+        (replace(good, minutes=0.0), TooShort, "--minutes is 0.0, must be above 0"),
+        (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),
+        (replace(good, size="paper"), TooFew, "136, must be at least 512"),
+    ]
+
+
+def test_what_makes_no_sense_is_refused_and_leaves_no_run(episodes: Path, tmp_path: Path) -> None:
+    for command, error, complaint in refusals(episodes, tmp_path):
+        with pytest.raises(error, match=complaint):
+            command.run()
+        assert not command.out.exists()
+
+
+def test_a_gpu_that_is_not_there_is_refused(episodes: Path, tmp_path: Path) -> None:
+    if torch.cuda.is_available():
+        assert Train(from_mcap=episodes, out=tmp_path, device="cuda").device == "cuda"
+        return
+    with pytest.raises(NoDevice, match="use --device cpu"):
+        Train(from_mcap=episodes, out=tmp_path / "run", device="cuda").run()
+
+
+def test_a_directory_that_holds_a_run_is_left_alone(run: Path, episodes: Path) -> None:
+    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    with pytest.raises(OccupiedOutput, match="already holds a run"):
+        Train(from_mcap=episodes, out=run).run()
+    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+
+
+def test_episodes_of_different_point_counts_are_refused(tmp_path: Path) -> None:
+    for index, points in enumerate((POINTS, POINTS + 1)):
+        seen = rollout.frames(3, seed=index, points=points)
+        rollout.write(tmp_path / f"episode-{index}.mcap", seen)
+    with pytest.raises(BadEpisode, match="one number of points"):
+        Train(from_mcap=tmp_path, out=tmp_path / "run").run()
+
+
+def test_the_command_line_is_read_without_loading_torch() -> None:
+    code = "import sys, dnet.commands.train; sys.exit('torch' in sys.modules)"
+    began = time.monotonic()
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert time.monotonic() - began < 30
