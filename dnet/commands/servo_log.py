@@ -50,7 +50,6 @@ class ServoLog:
 
     def add(self, index: int, step: Step) -> None:
         """Write one step, and the way of the arm until the next."""
-        self._episode.add(step.frame)
         self._episode.add_step(step, index)
         self._console.print(describe_step(step, index), highlight=False)
         if step.plan is None:

@@ -86,6 +86,7 @@ class Train:
             writer=writer,
             console=console,
         )
+        writer.finish(result, config)
         model.load_state_dict(result.best)
         errors = {
             "training": errors_of(model, training),
@@ -128,9 +129,12 @@ class Train:
         self, division: "Division", config: "DeformerNetConfig", settings: "TrainingSettings"
     ) -> dict[str, Any]:
         """Return what shaped the run, as config.json holds it."""
+        from dnet.training.frames import samplings_for  # noqa: PLC0415
+
+        samplings = samplings_for(sum(survey.frames for survey in division.training))
         return {
             "network": asdict(config),
-            "training": asdict(settings) | {"minutes": self.minutes},
+            "training": asdict(settings) | {"minutes": self.minutes, "samplings": samplings},
             "data": {
                 "directory": str(self.from_mcap),
                 "training": [survey.episode_id for survey in division.training],

@@ -17,7 +17,7 @@ from dnet.nets.neighbourhoods import (
     find_neighbourhoods,
     stack,
 )
-from dnet.nets.pointconv import Norm, SetAbstraction, make_norm
+from dnet.nets.pointconv import Norm, SetAbstraction, gather, make_norm
 from dnet.types import Cloud, Point
 
 
@@ -59,15 +59,27 @@ class Encoder(nn.Module):
 
     def forward(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch."""
-        points = clouds.points
-        scales, neighbours = clouds.inverse_densities, clouds.neighbours
-        features = self.first(points, points, inverse_density=scales[0], neighbours=neighbours[0])
-        points = points[:, : features.shape[1]]
-        features = self.second(
-            points, features, inverse_density=scales[1], neighbours=neighbours[1]
+        below, scales = clouds.points, clouds.inverse_densities
+        middle = gather(below, clouds.centroids)
+        features = self.first(
+            below,
+            below,
+            centroids=middle,
+            neighbours=clouds.neighbours[0],
+            inverse_density=scales[0],
         )
-        points = points[:, : features.shape[1]]
-        whole: Tensor = self.third(points, features, inverse_density=scales[2], neighbours=None)
+        above = middle[:, : scales[2].shape[1]]
+        features = self.second(
+            middle,
+            features,
+            centroids=above,
+            neighbours=clouds.neighbours[1],
+            inverse_density=scales[1],
+        )
+        centre = above.mean(dim=1, keepdim=True)
+        whole: Tensor = self.third(
+            above, features, centroids=centre, neighbours=None, inverse_density=scales[2]
+        )
         return whole[:, 0]
 
 
@@ -123,7 +135,7 @@ class DeformerNet(nn.Module):
         """Return the motion of the grasp that would turn `current` into `goal`, in metres.
 
         Args:
-            current: What is seen, in farthest-point order, in metres in the world frame.
+            current: What is seen, in metres in the world frame.
             goal: What should be seen, likewise.
 
         Raises:
@@ -150,7 +162,7 @@ def prepare(cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud") -> 
     """Return a cloud as a network of `config` takes it.
 
     Args:
-        cloud: Points in farthest-point order, in metres in the world frame.
+        cloud: Points in metres in the world frame.
         config: Of the network.
         what: Name of the cloud in an error.
 

@@ -1,15 +1,16 @@
 """What PointConv needs of a cloud's coordinates alone: neighbours and densities, found once."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32, Int16, Integer
+from jaxtyping import Float, Float32, Int16
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from dnet.geometry.sampling import farthest_rows
 from dnet.types import Cloud
 
 Size = Literal["light", "paper"]
@@ -21,7 +22,7 @@ class Grouping:
     """How one level of a network groups the points of the level below."""
 
     centroids: int
-    """Points that stay: the first ones, since a cloud comes in farthest-point order."""
+    """Points that stay, the farthest from each other."""
     neighbours: int
     """Nearest points that each centroid gathers, itself among them."""
 
@@ -38,8 +39,8 @@ BANDWIDTHS = (0.1, 0.2, 0.4)
 MOST_POINTS = 2**15 - 1
 """Of a cloud: its rows are kept as int16, so that tens of thousands of clouds fit in memory."""
 
-_ROWS = 128
 # Rows of the distance matrix held at once: 128 x 2048 floats stay in a processor's cache.
+_ROWS = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,68 +52,59 @@ class Neighbourhoods:
     """
 
     points: Float[Tensor, "*batch n 3"]
-    """Coordinates in farthest-point order, in the network's unit."""
+    """Coordinates in the network's unit."""
+    centroids: Int16[Tensor, "*batch s1"]
+    """Rows of `points` that stay at the first level; the first ones of these stay at the next."""
     neighbours: tuple[Int16[Tensor, "*batch s1 k1"], Int16[Tensor, "*batch s2 k2"]]
-    """For each of the first two levels: rows that each centroid gathers."""
+    """For each of the first two levels: rows of the level below that each centroid gathers."""
     inverse_densities: tuple[
         Float[Tensor, "*batch n"], Float[Tensor, "*batch s1"], Float[Tensor, "*batch s2"]
     ]
     """For each level: one over the density at every point that it gathers from."""
 
-    def __len__(self) -> int:
-        """Return how many clouds the batch holds."""
-        return len(self.points)
-
-    def take(self, rows: Integer[Tensor, "_"]) -> "Neighbourhoods":
-        """Return the clouds `rows` of a batch, as a batch."""
-        return Neighbourhoods(
-            self.points[rows],
-            (self.neighbours[0][rows], self.neighbours[1][rows]),
-            (
-                self.inverse_densities[0][rows],
-                self.inverse_densities[1][rows],
-                self.inverse_densities[2][rows],
-            ),
-        )
-
     def to(self, device: torch.device) -> "Neighbourhoods":
         """Return the same tables on `device`."""
+        return self._map(lambda table: table.to(device))
+
+    def _map(self, change: Callable[[Tensor], Tensor]) -> "Neighbourhoods":
+        first, second = self.neighbours
+        below, middle, above = self.inverse_densities
         return Neighbourhoods(
-            self.points.to(device),
-            (self.neighbours[0].to(device), self.neighbours[1].to(device)),
-            (
-                self.inverse_densities[0].to(device),
-                self.inverse_densities[1].to(device),
-                self.inverse_densities[2].to(device),
-            ),
+            change(self.points),
+            change(self.centroids),
+            (change(first), change(second)),
+            (change(below), change(middle), change(above)),
         )
 
 
-def find_neighbourhoods(points: Cloud, groupings: tuple[Grouping, Grouping]) -> Neighbourhoods:
+def find_neighbourhoods(
+    points: Cloud, groupings: tuple[Grouping, Grouping], *, start: int = 0
+) -> Neighbourhoods:
     """Return the neighbourhoods of one cloud.
 
     Args:
-        points: Coordinates in farthest-point order and in the network's unit, (n, 3); at least
-            as many as the first level has centroids and neighbours.
+        points: Coordinates in the network's unit, (n, 3); at least as many as the first level
+            has centroids and neighbours.
         groupings: The first two levels.
+        start: Row of the first centroid, from which the others are sampled. With 0, the
+            centroids of a cloud in farthest-point order are its first points.
     """
-    first, second = groupings
-    below, middle, above = points, points[: first.centroids], points[: second.centroids]
-    return Neighbourhoods(
-        torch.from_numpy(np.array(points)),
-        (_nearest(middle, below, first.neighbours), _nearest(above, middle, second.neighbours)),
-        (
-            _inverse_density(below, BANDWIDTHS[0]),
-            _inverse_density(middle, BANDWIDTHS[1]),
-            _inverse_density(above, BANDWIDTHS[2]),
-        ),
-    )
+    density = _inverse_density(points, BANDWIDTHS[0])
+    return _group(torch.from_numpy(np.array(points)), density, groupings, start=start)
+
+
+def regroup(
+    cloud: Neighbourhoods, groupings: tuple[Grouping, Grouping], *, start: int
+) -> Neighbourhoods:
+    """Return a single cloud with other centroids, sharing the memory of what stays the same."""
+    return _group(cloud.points, cloud.inverse_densities[0], groupings, start=start)
 
 
 def stack(clouds: Sequence[Neighbourhoods]) -> Neighbourhoods:
     """Return single clouds as one batch; all must have the same counts."""
     return Neighbourhoods(
         torch.stack([one.points for one in clouds]),
+        torch.stack([one.centroids for one in clouds]),
         (
             torch.stack([one.neighbours[0] for one in clouds]),
             torch.stack([one.neighbours[1] for one in clouds]),
@@ -121,6 +113,30 @@ def stack(clouds: Sequence[Neighbourhoods]) -> Neighbourhoods:
             torch.stack([one.inverse_densities[0] for one in clouds]),
             torch.stack([one.inverse_densities[1] for one in clouds]),
             torch.stack([one.inverse_densities[2] for one in clouds]),
+        ),
+    )
+
+
+def _group(
+    points: Float32[Tensor, "n 3"],
+    inverse_density: Float32[Tensor, " n"],
+    groupings: tuple[Grouping, Grouping],
+    *,
+    start: int,
+) -> Neighbourhoods:
+    first, second = groupings
+    below = points.numpy()
+    rows = farthest_rows(below, first.centroids, start=start)
+    middle = below[rows]
+    above = middle[: second.centroids]
+    return Neighbourhoods(
+        points,
+        torch.from_numpy(rows.astype(np.int16)),
+        (_nearest(middle, below, first.neighbours), _nearest(above, middle, second.neighbours)),
+        (
+            inverse_density,
+            _inverse_density(middle, BANDWIDTHS[1]),
+            _inverse_density(above, BANDWIDTHS[2]),
         ),
     )
 

@@ -23,10 +23,6 @@ class Placement:
     shifts: Float32[Tensor, "g 3"]
     """Translation, in metres."""
 
-    def to(self, device: torch.device) -> "Placement":
-        """Return the same placement on `device`."""
-        return Placement(self.turns.to(device), self.shifts.to(device))
-
 
 @dataclass(frozen=True, slots=True)
 class Augmentation:

@@ -31,7 +31,7 @@ class Batch:
 
 
 def all_pairs(
-    lengths: Sequence[int], *, seed: int, epoch: int, groups: int = 4, frames: int = 8
+    lengths: Sequence[int], *, seed: int, epoch: int, groups: int = 1, frames: int = 5
 ) -> list[Batch]:
     """Return the batches of one epoch, a pure function of the arguments.
 

@@ -12,7 +12,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as save_tensors
 from torch import Tensor
 
-from dnet.errors import BadCheckpoint, DnetError
+from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
@@ -21,6 +21,9 @@ BEST = "best.safetensors"
 """The file that stands for a run directory: the network with the smallest validation error."""
 
 _NETWORK = "DeformerNet"
+# One entry of the header for all: safetensors writes several in a random order, and the same
+# network should give the same bytes.
+_KEY = "dnet"
 _HINT = "give a run directory or a .safetensors file of `dnet train`"
 
 
@@ -41,16 +44,12 @@ def save(
         config: Of the network.
         metrics: What is known of it, as JSON, for people.
     """
-    header = {
-        "network": _NETWORK,
-        "config": json.dumps(asdict(config)),
-        "metrics": json.dumps(metrics or {}),
-    }
+    header = {"network": _NETWORK, "config": asdict(config), "metrics": dict(metrics or {})}
     path.parent.mkdir(parents=True, exist_ok=True)
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in weights.items()}
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        beside.write_bytes(save_tensors(tensors, metadata=header))
+        beside.write_bytes(save_tensors(tensors, metadata={_KEY: json.dumps(header)}))
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
@@ -70,7 +69,7 @@ def load(path: Path) -> DeformerNet:
     if header.get("network") != _NETWORK:
         found = header.get("network", "an unnamed network")
         raise BadCheckpoint(file, f"holds {found}, not {_NETWORK}", _HINT)
-    model = DeformerNet(_config(file, header.get("config", "")))
+    model = DeformerNet(_config(file, header.get("config")))
     _check_shapes(file, weights, model.state_dict())
     model.load_state_dict(weights)
     return model.eval()
@@ -82,12 +81,9 @@ def read_metrics(path: Path) -> dict[str, Any]:
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt.
     """
-    file = _weights_file(path)
-    header, _ = _read(file)
-    try:
-        return dict(json.loads(header.get("metrics", "{}")))
-    except (ValueError, TypeError, RecursionError) as error:
-        raise BadCheckpoint(file, f"has unreadable metrics ({error})", "train it again") from error
+    header, _ = _read(_weights_file(path))
+    metrics = header.get("metrics")
+    return metrics if isinstance(metrics, dict) else {}
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
@@ -108,18 +104,22 @@ def _weights_file(path: Path) -> Path:
     return file
 
 
-def _read(file: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
+def _read(file: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     try:
         with safe_open(file, framework="pt", device="cpu") as content:
-            header = content.metadata() or {}
-            return header, {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
+            text = (content.metadata() or {}).get(_KEY, "{}")
+            weights = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
     except (SafetensorError, OSError, ValueError) as error:
         raise BadCheckpoint(file, f"is not a whole safetensors file ({error})", _HINT) from error
-
-
-def _config(file: Path, text: str) -> DeformerNetConfig:
     try:
-        fields = json.loads(text)
+        header = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadCheckpoint(file, f"has an unreadable header ({error})", _HINT) from error
+    return header if isinstance(header, dict) else {}, weights
+
+
+def _config(file: Path, fields: Any) -> DeformerNetConfig:
+    try:
         config = DeformerNetConfig(
             size=fields["size"],
             norm=fields["norm"],
@@ -128,7 +128,7 @@ def _config(file: Path, text: str) -> DeformerNetConfig:
             motion_unit=float(fields["motion_unit"]),
         )
         known = config.size in get_args(Size) and config.norm in get_args(Norm)
-    except (KeyError, TypeError, ValueError, RecursionError, DnetError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise BadCheckpoint(file, f"has an unreadable config ({error!r})", _HINT) from error
     if not known:
         raise BadCheckpoint(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -12,14 +12,18 @@ from torch import Tensor
 
 from dnet.errors import BadEpisode, TooFew
 from dnet.nets.deformernet import DeformerNetConfig, prepare
-from dnet.nets.neighbourhoods import Neighbourhoods, stack
+from dnet.nets.neighbourhoods import GROUPINGS, Neighbourhoods, regroup
 from dnet.training.batches import ordered_pairs
 from dnet.types import Frame, FrameKind, Point
+
+MOST_SAMPLINGS = 8
+"""Choices of centroids of a cloud; more of them cost time and teach little more."""
 
 SETTLED: tuple[FrameKind, ...] = ("rest", "shape")
 """Kinds of frame that pairs are made of; what is seen on the way is still moving."""
 
 
+@runtime_checkable
 class EpisodeSource(Protocol):
     """What training asks of an episode; `dnet.datasets.reader.EpisodeReader` is one."""
 
@@ -42,8 +46,8 @@ class EpisodeSource(Protocol):
 class Frames:
     """The settled frames of some episodes, those of one episode together."""
 
-    clouds: Neighbourhoods
-    """Of every frame, (n, ...)."""
+    clouds: tuple[tuple[Neighbourhoods, ...], ...]
+    """Of every frame: its cloud with one or several choices of centroids, the usual one first."""
     grasps: Float32[Tensor, "n 3"]
     """The manipulation point at each frame, in metres."""
     rest: Bool[Tensor, " n"]
@@ -66,13 +70,12 @@ class Frames:
 
     def all_pairs(self) -> tuple[Int64[Tensor, " p"], Int64[Tensor, " p"]]:
         """Return the rows of the current and of the goal frame of every ordered pair."""
-        device = self.grasps.device
         current, goal = [], []
         for rows in self.episodes:
             one, other = ordered_pairs(len(rows))
             current.append(torch.from_numpy(one) + rows.start)
             goal.append(torch.from_numpy(other) + rows.start)
-        return torch.cat(current).to(device), torch.cat(goal).to(device)
+        return torch.cat(current), torch.cat(goal)
 
     def motions(
         self, current: Int64[Tensor, " p"], goal: Int64[Tensor, " p"]
@@ -80,22 +83,26 @@ class Frames:
         """Return the motion of the grasp between frames of these rows, in metres."""
         return self.grasps[goal] - self.grasps[current]
 
-    def to(self, device: torch.device) -> "Frames":
-        """Return the same frames on `device`."""
-        return Frames(
-            self.clouds.to(device), self.grasps.to(device), self.rest.to(device), self.lengths
-        )
-
 
 def settled(kinds: tuple[FrameKind, ...]) -> list[int]:
     """Return the numbers of the frames that pairs are made of."""
     return [index for index, kind in enumerate(kinds) if kind in SETTLED]
 
 
+def samplings_for(count: int) -> int:
+    """Return how many choices of centroids to keep of each of `count` clouds.
+
+    Few clouds need many; many have variety enough, and would not fit in memory.
+    """
+    return max(1, min(MOST_SAMPLINGS, 20_000 // count))
+
+
 def read_frames(
     episodes: Iterable[EpisodeSource],
     config: DeformerNetConfig,
     *,
+    samplings: int = 1,
+    seed: int = 0,
     on_cloud: Callable[[], None] = lambda: None,
 ) -> Frames:
     """Read every settled frame of `episodes` and find its neighbourhoods.
@@ -105,6 +112,10 @@ def read_frames(
     Args:
         episodes: Opened one after another.
         config: Of the network that will see the frames.
+        samplings: How many choices of centroids to keep of each cloud. The network must not
+            care which points happen to be centroids; with few frames it learns that only from
+            seeing the same cloud with others.
+        seed: Of all choices of centroids but the usual one.
         on_cloud: Called after each cloud.
 
     Raises:
@@ -112,10 +123,12 @@ def read_frames(
         BadCloud: If a coordinate is NaN or infinite.
         TooFew: If no episode has two settled frames.
     """
-    clouds: list[Neighbourhoods] = []
+    clouds: list[tuple[Neighbourhoods, ...]] = []
+    rng = np.random.default_rng(seed)
     grasps: list[Point] = []
     rest: list[bool] = []
     lengths: list[int] = []
+    groupings = GROUPINGS[config.size]
     for episode in episodes:
         chosen = settled(episode.kinds)
         if len(chosen) < 2:
@@ -124,7 +137,9 @@ def read_frames(
             frame = episode.frame(index)
             where = f"frame {index} of {episode.path}"
             _check_points(frame, config, path=episode.path)
-            clouds.append(prepare(frame.cloud, config, what=where))
+            cloud = prepare(frame.cloud, config, what=where)
+            starts = rng.integers(config.points, size=samplings - 1).tolist()
+            clouds.append((cloud, *(regroup(cloud, groupings, start=start) for start in starts)))
             grasps.append(frame.grasp)
             rest.append(frame.kind == "rest")
             on_cloud()
@@ -132,7 +147,7 @@ def read_frames(
     if not lengths:
         raise TooFew("number of episodes with two settled frames", 0, 1)
     return Frames(
-        stack(clouds),
+        tuple(clouds),
         torch.from_numpy(np.stack(grasps).astype(np.float32)),
         torch.tensor(rest),
         tuple(lengths),

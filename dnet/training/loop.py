@@ -14,6 +14,7 @@ from torch.nn import functional
 
 from dnet.errors import TooFew
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.neighbourhoods import stack
 from dnet.training.augment import Augmentation, place, turn
 from dnet.training.batches import Batch, all_pairs
 from dnet.training.frames import Frames
@@ -35,9 +36,9 @@ class TrainingSettings:
     schedule: Schedule = "cosine"
     seed: int = 0
     """Of the first weights, the order of batches and the augmentation."""
-    groups: int = 4
+    groups: int = 1
     """Groups in a batch."""
-    frames: int = 8
+    frames: int = 5
     """Frames in a group, all pairs of which are trained on."""
     augmentation: Augmentation | None = field(default_factory=Augmentation)
     """How groups are placed anew at every turn; None leaves them where they are."""
@@ -134,7 +135,7 @@ def fit(
     up to there have left is returned.
 
     Args:
-        model: On the device of the frames.
+        model: On any device.
         training: What to learn from.
         validation: What the best epoch is chosen by.
         settings: How.
@@ -189,7 +190,7 @@ class _Clock:
     seconds: float
     began: float
 
-    def progress(self, epochs_done: float) -> float:
+    def progress(self, epochs_done: int | float) -> float:
         elapsed = time.monotonic() - self.began
         return min(1.0, max(epochs_done / self.epochs, elapsed / self.seconds))
 
@@ -246,18 +247,19 @@ def _motions(
     rng: np.random.Generator,
 ) -> tuple[Tensor, Tensor]:
     """Return the predicted and the true motions of a batch, in metres."""
-    device = frames.grasps.device
-    rows, groups = batch.frames.to(device), batch.groups.to(device)
-    current, goal = batch.current.to(device), batch.goal.to(device)
-    clouds = frames.clouds.take(rows)
-    true = frames.motions(rows[current], rows[goal])
+    device = next(model.parameters()).device
+    groups, current, goal = batch.groups, batch.current, batch.goal
+    choices = [frames.clouds[row] for row in batch.frames.tolist()]
+    clouds = stack([of[rng.integers(len(of))] for of in choices])
+    true = frames.motions(batch.frames[current], batch.frames[goal])
     if augmentation is not None:
-        placement = augmentation.draw(rng, batch.group_count).to(device)
+        placement = augmentation.draw(rng, batch.group_count)
         unit = model.config.coordinate_unit
         clouds = place(clouds, placement, groups=groups, coordinate_unit=unit)
         true = turn(true, placement, groups=groups[current])
-    features = model.encode(clouds)
-    return model.motion(features[current], features[goal]), true
+    features = model.encode(clouds.to(device))
+    predicted = model.motion(features[current.to(device)], features[goal.to(device)])
+    return predicted, true.to(device)
 
 
 def _weights(model: DeformerNet) -> Weights:

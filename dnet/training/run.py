@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint, OccupiedOutput
-from dnet.nets.deformernet import DeformerNet
+from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.training.checkpoints import BEST, save, write_json
-from dnet.training.loop import EpochDone
+from dnet.training.loop import EpochDone, Result
 
 LAST, CONFIG, METRICS = "last.safetensors", "config.json", "metrics.jsonl"
 
 
 class RunWriter:
-    """Writes a training down as it goes, so that nothing but the epoch under way can be lost.
+    """Writes a training down as it goes.
 
     The directory is made with the first epoch: a training that never got there leaves none.
 
@@ -43,12 +43,22 @@ class RunWriter:
             write_json(self.path / CONFIG, self._content)
             self._began = True
         metrics = asdict(done)
+        # Written as it goes, so that a crash loses the epoch under way alone.
         with (self.path / METRICS).open("a", encoding="utf-8") as file:
             file.write(json.dumps(metrics) + "\n")
         weights = model.state_dict()
         if done.best:
             save(self.path / BEST, weights, config=model.config, metrics=metrics)
         save(self.path / LAST, weights, config=model.config, metrics=metrics)
+
+    def finish(self, result: Result, config: DeformerNetConfig) -> None:
+        """Write everything once more, in case an interrupt came in the middle of `add`."""
+        best = min(result.history, key=lambda done: done.validation.any_pair.mse_mm2)
+        write_json(self.path / CONFIG, self._content)
+        lines = [json.dumps(asdict(done)) + "\n" for done in result.history]
+        (self.path / METRICS).write_text("".join(lines), encoding="utf-8")
+        save(self.path / BEST, result.best, config=config, metrics=asdict(best))
+        save(self.path / LAST, result.last, config=config, metrics=asdict(result.history[-1]))
 
 
 def read_config(run: Path) -> dict[str, Any]:

@@ -7,10 +7,11 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from dnet.nets.deformernet import DeformerNet
+from dnet.nets.neighbourhoods import stack
 from dnet.training.frames import Frames
 
+# Encoded and compared at once: few enough that judging takes no more memory than learning.
 _CLOUDS, _PAIRS = 32, 65536
-# Encoded and compared at once: what keeps the memory of a validation below that of training.
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +23,8 @@ class Scores:
     """Squared error, mean over pairs and over x, y, z, in square millimetres."""
     mean_mm: float
     """Mean Euclidean error in millimetres."""
-    r2: float
-    """Share of the variance of the motions that is explained."""
+    r2: float | None
+    """Share of the variance of the motions that is explained; None if they do not vary."""
     zero_mse_mm2: float
     """`mse_mm2` of predicting no motion."""
     zero_mean_mm: float
@@ -44,19 +45,19 @@ def score(predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> Scores
     """Return the errors of `predicted` motions, both in metres."""
     predicted_mm, true_mm = predicted.double() * 1000, true.double() * 1000
     error = predicted_mm - true_mm
-    variance = (true_mm - true_mm.mean(dim=0)).square().sum()
+    variance = (true_mm - true_mm.mean(dim=0)).square().sum().item()
     return Scores(
         pairs=len(true),
         mse_mm2=float(error.square().mean()),
         mean_mm=float(error.norm(dim=1).mean()),
-        r2=float(1 - error.square().sum() / variance),
+        r2=1 - error.square().sum().item() / variance if variance else None,
         zero_mse_mm2=float(true_mm.square().mean()),
         zero_mean_mm=float(true_mm.norm(dim=1).mean()),
     )
 
 
 def errors_of(model: DeformerNet, frames: Frames) -> Errors:
-    """Return the errors of `model` on `frames`, which lie on its device."""
+    """Return the errors of `model` on `frames`, each cloud with its usual centroids."""
     was_training = model.training
     model.eval()
     try:
@@ -76,15 +77,16 @@ def errors_of(model: DeformerNet, frames: Frames) -> Errors:
 def _predict(
     model: DeformerNet, frames: Frames, current: Int64[Tensor, " p"], goal: Int64[Tensor, " p"]
 ) -> Float32[Tensor, "p 3"]:
-    rows = torch.arange(len(frames.clouds), device=current.device)
-    features = torch.cat(
-        [model.encode(frames.clouds.take(part)) for part in torch.split(rows, _CLOUDS)]
-    )
-    return torch.cat(
-        [
-            model.motion(features[one], features[other])
-            for one, other in zip(
-                torch.split(current, _PAIRS), torch.split(goal, _PAIRS), strict=True
-            )
-        ]
-    )
+    device = next(model.parameters()).device
+    clouds = [choices[0] for choices in frames.clouds]
+    batches = (clouds[first : first + _CLOUDS] for first in range(0, len(clouds), _CLOUDS))
+    features = torch.cat([model.encode(stack(batch).to(device)) for batch in batches])
+    motions = [
+        model.motion(features[one], features[other]).cpu()
+        for one, other in zip(
+            torch.split(current.to(device), _PAIRS),
+            torch.split(goal.to(device), _PAIRS),
+            strict=True,
+        )
+    ]
+    return torch.cat(motions)

@@ -26,7 +26,7 @@ def network(size: Size = "light", norm: Norm = "group", points: int = 192) -> De
     # First weights have norms of scale 1 and shift 0, which would hide a mistake in using them.
     with torch.no_grad():
         for weights in model.parameters():
-            weights.add_(0.1 * torch.rand_like(weights) * weights.abs().mean().clamp(min=0.1))
+            weights.add_(0.1 * torch.randn_like(weights))
     return model
 
 
@@ -52,6 +52,7 @@ def watch_closely(model: DeformerNet) -> None:
 def in_double(seen: Neighbourhoods) -> Neighbourhoods:
     points = seen.points.double()
     first, second, third = (
+        # In farthest-point order, the centroids of each level are the first points.
         reference.inverse_density(points[:, : densities.shape[1]], bandwidth)
         for densities, bandwidth in zip(seen.inverse_densities, BANDWIDTHS, strict=True)
     )
@@ -88,7 +89,7 @@ def test_the_network_is_the_one_of_the_equations(
     got = model(here, there) / model.config.motion_unit
     want = reference.motion(plain, here.points, there.points) / plain.config.motion_unit
     torch.testing.assert_close(got, want, rtol=1e-8, atol=1e-8)
-    assert want.std(dim=0).max().item() > 1e-7
+    assert want.std(dim=0).max().item() > 1e-3
     got_gradients = gradients((got - wish).square().sum(), model)
     want_gradients = gradients((want - wish).square().sum(), plain)
     largest = max(float(gradient.abs().max()) for gradient in want_gradients.values())
@@ -104,13 +105,13 @@ def test_the_network_is_the_one_of_the_equations(
 
 def test_running_figures_are_kept_as_batch_normalisation_defines_them() -> None:
     model = network(norm="batch")
-    seen = batch(clouds(4), model)
+    seen, turned = batch(clouds(4), model), batch(clouds(4)[::-1], model)
     torch_norm = torch.nn.BatchNorm1d(128)
     norm = model.head.hidden[1]
     caught: list[Tensor] = []
     model.head.hidden[0].register_forward_hook(lambda *call: caught.append(call[2].detach()))
     for _ in range(3):
-        model(seen, seen.take(torch.tensor([1, 2, 3, 0])))
+        model(seen, turned)
     for x in caught:
         torch_norm(x)
     torch.testing.assert_close(norm.mean, torch_norm.running_mean)

@@ -11,6 +11,7 @@ from dnet.nets.neighbourhoods import (
     Grouping,
     Neighbourhoods,
     find_neighbourhoods,
+    regroup,
     stack,
 )
 from dnet.types import Cloud
@@ -29,7 +30,7 @@ def squares(points: Cloud) -> np.ndarray:
 
 
 def tables(found: Neighbourhoods) -> list[torch.Tensor]:
-    return [found.points, *found.neighbours, *found.inverse_densities]
+    return [found.points, found.centroids, *found.neighbours, *found.inverse_densities]
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -66,13 +67,42 @@ def test_a_lonely_point_has_a_larger_inverse_density_than_a_crowded_one() -> Non
     assert density[0] > 10 * density[1:].max()
 
 
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_the_centroids_of_a_cloud_in_farthest_point_order_are_its_first_points(seed: int) -> None:
+    found = find_neighbourhoods(cloud(seed), FEW)
+    assert found.centroids.tolist() == list(range(12))
+
+
+@given(seed=st.integers(0, 2**32 - 1), start=st.integers(0, 39))
+@settings(max_examples=20, deadline=None)
+def test_other_centroids_make_the_tables_of_the_cloud_sampled_from_there(
+    seed: int, start: int
+) -> None:
+    points = cloud(seed)
+    again = regroup(find_neighbourhoods(points, FEW), FEW, start=start)
+    for got, want in zip(
+        tables(again), tables(find_neighbourhoods(points, FEW, start=start)), strict=True
+    ):
+        assert torch.equal(got, want)
+    assert again.centroids[0] == start
+    sampled = farthest_points(points, 12, start=start)
+    np.testing.assert_array_equal(points[again.centroids.long()], sampled)
+
+
+def test_other_centroids_share_the_memory_of_points_and_density() -> None:
+    found = find_neighbourhoods(cloud(0), FEW)
+    again = regroup(found, FEW, start=9)
+    assert again.points.data_ptr() == found.points.data_ptr()
+    assert again.inverse_densities[0].data_ptr() == found.inverse_densities[0].data_ptr()
+
+
 def test_a_batch_holds_each_cloud_as_it_was() -> None:
     singles = [find_neighbourhoods(cloud(seed), FEW) for seed in range(4)]
     batch = stack(singles)
-    assert len(batch) == 4
-    some = batch.take(torch.tensor([3, 1]))
-    for place, single in enumerate((singles[3], singles[1])):
-        for many, one in zip(tables(some), tables(single), strict=True):
+    for place, single in enumerate(singles):
+        for many, one in zip(tables(batch), tables(single), strict=True):
+            assert len(many) == 4
             assert torch.equal(many[place], one)
 
 

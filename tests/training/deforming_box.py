@@ -15,7 +15,7 @@ from dnet.training.frames import Frames, read_frames
 from dnet.types import Frame, FrameKind
 
 SMALL = DeformerNetConfig(points=160)
-SIZE = np.array([0.1, 0.1, 0.04])
+SIZE, CENTRE = np.array([0.1, 0.1, 0.04]), np.array([0.0, 0.0, 0.02])
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class BoxEpisode:
         motions = rng.uniform([-0.04, -0.04, 0], [0.04, 0.04, 0.04], (len(self.kinds), 3))
         motion = motions[index] * (self.kinds[index] != "rest")
 
-        rest = (surface + (0, 0, 0.5)) * SIZE
+        rest = surface * SIZE + CENTRE
         near = np.exp(-((np.linalg.norm(rest - grasp, axis=1) / 0.06) ** 2))
         held = np.exp(-((np.linalg.norm(rest - hold, axis=1) / 0.03) ** 2))
         bent = rest + (near * (1 - held))[:, None] * motion
