@@ -49,8 +49,8 @@ class EpisodeDescription:
 def list_episodes(directory: Path) -> pl.DataFrame:
     """Return one row an episode, those that are unfinished or broken with a note.
 
-    Columns: episode, frames, shapes, points (least of any frame), seconds (of simulation), MB,
-    finished, note.
+    Columns: episode, frames, shapes (settled after a motion), points (least of any frame),
+    seconds (of simulation), MB, finished, note.
 
     Raises:
         MissingPath: If there is no such directory.
@@ -134,7 +134,7 @@ def _row(path: Path) -> tuple[Any, ...]:
             return (
                 episode.meta.episode_id,
                 len(episode),
-                sum(kind != "way" for kind in episode.kinds),
+                episode.kinds.count("shape"),
                 min(points, default=0),
                 float(episode.times[-1] - episode.times[0]) if len(episode) else 0.0,
                 megabytes,

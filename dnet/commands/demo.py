@@ -23,7 +23,7 @@ class Demo:
 
     out: Path = Path("demo")
     """Directory for everything; made if need be."""
-    pairs: int = 6
+    pairs: int = 8
     """Episodes to record."""
     shapes: int = 20
     """Shapes an episode."""

@@ -150,16 +150,18 @@ def _inverse_density(points: Cloud, bandwidth: float) -> Float32[Tensor, "_"]:
     """Return one over the Gaussian kernel density at each point (Wu, Qi, Fuxin 2019).
 
     Distances come from differences: the expansion |a|^2 + |b|^2 - 2ab loses in float32 the
-    digits that matter as soon as the cloud stands away from the origin.
+    digits that matter as soon as the cloud stands away from the origin. In numpy, since these
+    many small steps wait for each other on several threads, most of all on a busy machine.
     """
-    cloud = torch.from_numpy(np.array(points))
-    x, y, z = cloud.T.contiguous()
-    densities = []
-    for rows in torch.split(cloud, _ROWS):
-        squares = (rows[:, :1] - x).square_()
-        for axis, coordinates in ((1, y), (2, z)):
-            difference = rows[:, axis, None] - coordinates
-            squares.addcmul_(difference, difference)
-        kernel = squares.mul_(-1 / (2 * bandwidth**2)).exp_()
-        densities.append(kernel.mean(dim=1) / (2.5 * bandwidth))
-    return 1 / torch.cat(densities)
+    x, y, z = np.ascontiguousarray(points.T)
+    exponent = np.float32(-1 / (2 * bandwidth**2))
+    densities = np.empty(len(points), dtype=np.float32)
+    for first in range(0, len(points), _ROWS):
+        rows = points[first : first + _ROWS]
+        squares = np.square(rows[:, :1] - x)
+        squares += np.square(rows[:, 1:2] - y)
+        squares += np.square(rows[:, 2:] - z)
+        squares *= exponent
+        kernel = np.exp(squares, out=squares)
+        densities[first : first + _ROWS] = kernel.mean(axis=1) / (2.5 * bandwidth)
+    return torch.from_numpy(1 / densities)

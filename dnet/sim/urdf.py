@@ -64,7 +64,7 @@ def _add_links(robot: ElementTree.Element) -> None:
     _box(link, "dark", (0.045, 0.06, 0.08), (0.0, 0.0, -0.02))
 
     link = _link(robot, "roll_link", 0.02, (0.01, 0.01, TOOL_LENGTH), (0.0, 0.0, -TOOL_LENGTH / 2))
-    _rod(link, "steel", (0.0, 0.0, -TOOL_LENGTH + 0.005), (0.0, 0.0, -0.005), SHAFT_RADIUS)
+    _rod(link, "steel", (0.0, 0.0, -TOOL_LENGTH + 0.005), (0.0, 0.0, 0.0), SHAFT_RADIUS)
 
     link = _link(robot, "wrist_pitch_link", 0.0125, (0.01, 0.008, 0.008), (0.0045, 0.0, 0.0))
     _rod(link, "steel", (0.0, 0.0, 0.0), (WRIST_LENGTH, 0.0, 0.0), 0.0038)

@@ -149,7 +149,7 @@ def fit(
     best = last = _weights(model)
     interrupted = False
     try:
-        while not history or clock.progress(len(history)) < 1:
+        while not history or history[-1].progress < 1:
             epoch = len(history)
             loss = _epoch(
                 model,

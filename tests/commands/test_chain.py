@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from dnet.cli import main
 from dnet.commands.servo import split_goal
 from dnet.datasets.reader import EpisodeReader
 from dnet.geometry.chamfer import chamfer
+from dnet.recorders.episode import EpisodeWriter
+from dnet.sim.arms import ArmModel, Placement
 
 RERUN = Path(sys.executable).parent / "rerun"
 
@@ -150,6 +153,24 @@ def test_a_goal_of_another_size_is_refused(demo: Path, tmp_path: Path) -> None:
         tmp_path / "few" / "episode-0-00000.mcap", "--out", tmp_path / "x",
     )  # fmt: skip
     assert "takes clouds of 2048 points, the goal has 512" in message
+
+
+def test_a_grasp_out_of_reach_is_refused(demo: Path, tmp_path: Path) -> None:
+    far = tmp_path / "far.mcap"
+    with EpisodeReader(demo / "data" / "episode-0-00000.mcap") as near:
+        scene = replace(near.meta.scene, manipulation_point=(0.5, 0.0, 0.04))
+        meta = replace(near.meta, episode_id="far", scene=scene)
+        arms = ArmModel(Placement())
+        with EpisodeWriter(far, meta, arms=arms, attachments={}) as writer:
+            for number in range(len(near)):
+                writer.add(near.frame(number))
+            writer.finish({})
+    message = refusal(
+        "servo", "--checkpoint", demo / "train", "--goal", far, "--out", tmp_path / "x"
+    )
+    assert "(0.5000, 0.0000, 0.0400) m is out of reach: " in message
+    assert "limits" in message
+    assert not (tmp_path / "x").exists()
 
 
 def test_training_over_a_run_is_refused(demo: Path) -> None:

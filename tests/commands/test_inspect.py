@@ -25,9 +25,9 @@ def test_ls_prints_a_row_an_episode_and_the_sums(
     run("ls", tmp_path)
     header, first, second, sums = capsys.readouterr().out.splitlines()
     assert header.split() == ["episode", "frames", "shapes", "points", "seconds", "MB", "finished"]
-    assert first.split()[:5] == ["a", "3", "2", "64", "1.00"]
-    assert second.split()[:5] == ["b", "7", "4", "64", "3.00"]
-    assert sums.startswith("2 of 2 episodes finished, 6 shapes")
+    assert first.split()[:5] == ["a", "3", "1", "64", "1.00"]
+    assert second.split()[:5] == ["b", "7", "3", "64", "3.00"]
+    assert sums.startswith("2 of 2 episodes finished, 4 shapes")
 
 
 def test_ls_goes_on_past_a_broken_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,7 +36,7 @@ def test_ls_goes_on_past_a_broken_file(tmp_path: Path, capsys: pytest.CaptureFix
     run("ls", tmp_path)
     out = capsys.readouterr().out
     assert "cut off in the middle" in out
-    assert "1 of 2 episodes finished, 2 shapes" in out
+    assert "1 of 2 episodes finished, 1 shapes" in out
 
 
 def test_ls_of_nothing_says_how_to_record(tmp_path: Path) -> None:

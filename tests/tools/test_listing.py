@@ -26,7 +26,7 @@ def test_each_episode_has_a_row_with_its_figures(tmp_path: Path) -> None:
     table = list_episodes(tmp_path)
     assert table["episode"].to_list() == ["a", "b"]
     assert table["frames"].to_list() == [3, 7]
-    assert table["shapes"].to_list() == [2, 4]
+    assert table["shapes"].to_list() == [1, 3]
     assert table["points"].to_list() == [64, 50]
     assert table["seconds"].to_list() == [1.0, 3.0]
     sizes = [(tmp_path / f"{name}.mcap").stat().st_size / 1e6 for name in "ab"]
