@@ -84,12 +84,17 @@ def test_rerun_accepts_an_episode(recorded: Path) -> None:
 
 def test_ctrl_c_keeps_finished_episodes_and_the_frames_of_the_current_one(tmp_path: Path) -> None:
     out = tmp_path / "data"
+    # A background job inherits SIGINT as ignored: Python's own handler is put back.
+    script = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from dnet.cli import main; main()"
+    )
     process = subprocess.Popen(
-        [DNET, "record", out, "--pairs", "9", "--shapes", "2", "--seed", "4"],
+        [sys.executable, "-c", script, "record", out, "--pairs", "9", "--shapes", "2"],
         stderr=subprocess.PIPE,
         text=True,
     )
-    second = out / "episode-4-00001.mcap.part"
+    second = out / "episode-0-00001.mcap.part"
     deadline = time.monotonic() + 120
     while not (second.exists() and second.stat().st_size > 100_000):
         assert process.poll() is None, "ended before it could be interrupted"
@@ -101,8 +106,8 @@ def test_ctrl_c_keeps_finished_episodes_and_the_frames_of_the_current_one(tmp_pa
     assert "interrupted; what was finished is kept" in errors
     assert "Traceback" not in errors
     names = sorted(path.name for path in out.iterdir())
-    assert names == ["episode-4-00000.mcap", second.name]
-    with EpisodeReader(out / "episode-4-00000.mcap") as whole:
+    assert names == ["episode-0-00000.mcap", second.name]
+    with EpisodeReader(out / "episode-0-00000.mcap") as whole:
         assert whole.finished
         assert len(whole) == 3
     with EpisodeReader(second) as cut:
