@@ -12,7 +12,7 @@ LIBRARIES := libusb-1.0-0 libgl1 libegl1 libgomp1 mesa-vulkan-drivers libxkbcomm
 	libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo test check format lint type layers build benchmark clean
+.PHONY: help setup develop libraries demo test check format lint type layers build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -81,9 +81,6 @@ layers:
 
 build: develop ## Build the wheel and the sdist into dist/
 	$(BIN)/python -m build
-
-benchmark: develop ## Measure speed against peers, as ratios
-	$(BIN)/python -m pytest tests/benchmarks -s
 
 clean: ## Remove .venv, build products and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except DnetError as error:
         sys.exit(f"dnet: {error}")
     except KeyboardInterrupt:
-        print("dnet: interrupted; what was finished is kept", file=sys.stderr)  # noqa: T201
+        print("dnet: interrupted; what was finished is kept", file=sys.stderr)
         sys.exit(130)
     except BrokenPipeError:
         # Somebody piped us into `head`: not our error, and nothing more can be said there.

@@ -1,4 +1,4 @@
-"""The values that flow between the parts of dnet: frames, episodes, samples, plans, traces.
+"""The values that flow between the parts of dnet: scenes, frames, goals, plans, traces.
 
 Metres, seconds, radians and the world frame, unless a name says otherwise. The world's origin
 lies on the table top under the nominal centre of the object, z up; the holding arm stands on the
@@ -79,27 +79,6 @@ class EpisodeMeta:
     scene: Scene
     settings: dict[str, Any] = field(default_factory=dict)
     """Everything that shaped the recording (object, camera, workspace, versions), as JSON."""
-
-
-@dataclass(frozen=True, slots=True)
-class Episode:
-    """One pair of initial configuration and manipulation point, and what was made of it."""
-
-    meta: EpisodeMeta
-    frames: Sequence[Frame]
-    """Frame 0 is the rest shape after the grasp."""
-    finished: bool
-    """Whether the recording ended by itself; a crash leaves this False."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """Two frames of one episode and the motion of the grasp between them."""
-
-    current: Cloud
-    goal: Cloud
-    motion: Point
-    """Grasp of the goal frame minus grasp of the current one, (3,)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,9 +39,9 @@ class Demo:
             OccupiedOutput: If the directory holds a demo with other options.
             DnetError: If a step fails.
         """
-        from rich.console import Console  # noqa: PLC0415
+        from rich.console import Console
 
-        from dnet.commands.demo_steps import Steps, held_out_goal, summary  # noqa: PLC0415
+        from dnet.commands.demo_steps import Steps, held_out_goal, summary
 
         console = Console()
         steps = Steps(self.out, {**asdict(self), "out": str(self.out)}, console)

@@ -21,13 +21,13 @@ class List:
 
     def run(self) -> None:
         """Print one row an episode and a line of sums."""
-        from dnet.tools.listing import list_episodes  # noqa: PLC0415
-        from dnet.tools.tables import print_table  # noqa: PLC0415
+        from dnet.tools.listing import list_episodes
+        from dnet.tools.tables import print_table
 
         episodes = list_episodes(self.directory)
         quiet = (episodes["note"] == "").all()
         print_table(episodes.drop("note") if quiet else episodes)
-        print(  # noqa: T201
+        print(
             f"{episodes['finished'].sum()} of {episodes.height} episodes finished, "
             f"{episodes['shapes'].sum()} shapes, {episodes['MB'].sum():.1f} MB"
         )
@@ -48,14 +48,14 @@ class Info:
 
     def run(self) -> None:
         """Print the summary and the frames."""
-        from dnet.tools.listing import describe_episode  # noqa: PLC0415
-        from dnet.tools.tables import print_table  # noqa: PLC0415
+        from dnet.tools.listing import describe_episode
+        from dnet.tools.tables import print_table
 
         description = describe_episode(self.file)
         width = max(len(key) for key in description.summary)
         for key, value in description.summary.items():
             text = f"{value:.6g}" if isinstance(value, float) else str(value)
-            print(f"{key:<{width}}  {text}")  # noqa: T201
+            print(f"{key:<{width}}  {text}")
         print_table(description.frames)
 
 

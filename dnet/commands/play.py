@@ -29,8 +29,8 @@ class Play:
 
     def run(self) -> None:
         """Show the files."""
-        from dnet.datasets.reader import EpisodeReader  # noqa: PLC0415
-        from dnet.recorders.playback import play  # noqa: PLC0415
+        from dnet.datasets.reader import EpisodeReader
+        from dnet.recorders.playback import play
 
         play(
             self.files,
@@ -41,4 +41,4 @@ class Play:
         )
         for written in (self.screenshot, self.save):
             if written is not None:
-                print(written)  # noqa: T201
+                print(written)

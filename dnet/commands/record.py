@@ -42,10 +42,10 @@ class Record:
             TooFew: If a count is below 1, or the seed below 0.
             OccupiedOutput: If the directory holds episodes already.
         """
-        from rich.console import Console  # noqa: PLC0415
+        from rich.console import Console
 
-        from dnet.commands.laboratory import laboratory  # noqa: PLC0415
-        from dnet.commands.progress import progress  # noqa: PLC0415
+        from dnet.commands.laboratory import laboratory
+        from dnet.commands.progress import progress
 
         self._check()
         console = Console(stderr=True)
@@ -61,7 +61,7 @@ class Record:
         )
 
     def _check(self) -> None:
-        from dnet.errors import OccupiedOutput, TooFew  # noqa: PLC0415
+        from dnet.errors import OccupiedOutput, TooFew
 
         for what, value, least in (
             ("--pairs", self.pairs, 1),
@@ -79,9 +79,9 @@ class Record:
 
     def _episode(self, lab: "Laboratory", index: int, bars: "Progress", task: "TaskID") -> int:
         """Record one episode; return how many draws were rejected on the way."""
-        from dnet.recorders.episode import EpisodeWriter  # noqa: PLC0415
-        from dnet.sim.rollout import Rollout  # noqa: PLC0415
-        from dnet.types import EpisodeMeta  # noqa: PLC0415
+        from dnet.recorders.episode import EpisodeWriter
+        from dnet.sim.rollout import Rollout
+        from dnet.types import EpisodeMeta
 
         rollout = Rollout(
             lab.world,

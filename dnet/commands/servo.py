@@ -48,13 +48,13 @@ class Servo:
             DnetError: If the checkpoint, the goal or the output directory will not do, or the
                 grasp is out of reach.
         """
-        from rich.console import Console  # noqa: PLC0415
+        from rich.console import Console
 
-        from dnet.commands.laboratory import laboratory  # noqa: PLC0415
-        from dnet.commands.servo_log import RECORDING, ServoLog  # noqa: PLC0415
-        from dnet.servo.loop import ServoSettings, servo  # noqa: PLC0415
-        from dnet.sim.observe import observe  # noqa: PLC0415
-        from dnet.training.checkpoints import load  # noqa: PLC0415
+        from dnet.commands.laboratory import laboratory
+        from dnet.commands.servo_log import RECORDING, ServoLog
+        from dnet.servo.loop import ServoSettings, servo
+        from dnet.sim.observe import observe
+        from dnet.training.checkpoints import load
 
         self._check()
         model = load(self.checkpoint)
@@ -82,7 +82,7 @@ class Servo:
         console.print(f"watch it with `dnet play {self.out / RECORDING}`", highlight=False)
 
     def _check(self) -> None:
-        from dnet.errors import OccupiedOutput, TooFew  # noqa: PLC0415
+        from dnet.errors import OccupiedOutput, TooFew
 
         for what, value, least in (("--steps", self.steps, 1), ("--seed", self.seed, 0)):
             if value < least:
@@ -96,9 +96,9 @@ class Servo:
             raise OccupiedOutput(self.out, f"a run ({held[0].name})")
 
     def _read_goal(self, points: int) -> "tuple[Goal, Scene]":
-        from dnet.datasets.reader import EpisodeReader  # noqa: PLC0415
-        from dnet.errors import BadCheckpoint  # noqa: PLC0415
-        from dnet.types import Goal  # noqa: PLC0415
+        from dnet.datasets.reader import EpisodeReader
+        from dnet.errors import BadCheckpoint
+        from dnet.types import Goal
 
         path, number = split_goal(self.goal)
         with EpisodeReader(path) as episode:
@@ -113,7 +113,7 @@ class Servo:
             return Goal(frame.cloud.copy(), source), episode.meta.scene
 
     def _meta(self, lab: "Laboratory", goal: "Goal", scene: "Scene") -> "EpisodeMeta":
-        from dnet.types import EpisodeMeta  # noqa: PLC0415
+        from dnet.types import EpisodeMeta
 
         name = f"servo-{goal.source.replace('.mcap:', '-')}"
         settings = lab.describe() | {"goal": goal.source, "checkpoint": self.checkpoint.name}

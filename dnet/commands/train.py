@@ -59,15 +59,15 @@ class Train:
         Raises:
             DnetError: If the episodes, the output directory or an option will not do.
         """
-        from rich.console import Console  # noqa: PLC0415
+        from rich.console import Console
 
-        from dnet.commands.training_screen import error_table, show_data  # noqa: PLC0415
-        from dnet.nets.deformernet import DeformerNetConfig  # noqa: PLC0415
-        from dnet.training.allocation import keep_pages  # noqa: PLC0415
-        from dnet.training.episodes import divide  # noqa: PLC0415
-        from dnet.training.loop import new_network  # noqa: PLC0415
-        from dnet.training.run import RunWriter  # noqa: PLC0415
-        from dnet.training.scores import errors_of  # noqa: PLC0415
+        from dnet.commands.training_screen import error_table, show_data
+        from dnet.nets.deformernet import DeformerNetConfig
+        from dnet.training.allocation import keep_pages
+        from dnet.training.episodes import divide
+        from dnet.training.loop import new_network
+        from dnet.training.run import RunWriter
+        from dnet.training.scores import errors_of
 
         self._check()
         settings, device, console = self._settings(), self._device(), Console(stderr=True)
@@ -96,7 +96,7 @@ class Train:
         console.print(_closing_line(result, self.out))
 
     def _check(self) -> None:
-        from dnet.errors import TooFew, TooShort  # noqa: PLC0415
+        from dnet.errors import TooFew, TooShort
 
         for what, value, least in (("--epochs", self.epochs, 1), ("--seed", self.seed, 0)):
             if value < least:
@@ -105,8 +105,8 @@ class Train:
             raise TooShort("--minutes", self.minutes)
 
     def _settings(self) -> "TrainingSettings":
-        from dnet.training.augment import Augmentation  # noqa: PLC0415
-        from dnet.training.loop import TrainingSettings  # noqa: PLC0415
+        from dnet.training.augment import Augmentation
+        from dnet.training.loop import TrainingSettings
 
         return TrainingSettings(
             epochs=self.epochs,
@@ -116,9 +116,9 @@ class Train:
         )
 
     def _device(self) -> "torch.device":
-        import torch  # noqa: PLC0415
+        import torch
 
-        from dnet.errors import NoDevice  # noqa: PLC0415
+        from dnet.errors import NoDevice
 
         present = torch.cuda.is_available()
         if self.device == "cuda" and not present:
@@ -129,7 +129,7 @@ class Train:
         self, division: "Division", config: "DeformerNetConfig", settings: "TrainingSettings"
     ) -> dict[str, Any]:
         """Return what shaped the run, as config.json holds it."""
-        from dnet.training.frames import samplings_for  # noqa: PLC0415
+        from dnet.training.frames import samplings_for
 
         samplings = samplings_for(sum(survey.frames for survey in division.training))
         return {
@@ -153,8 +153,8 @@ class Train:
         writer: "RunWriter",
         console: "Console",
     ) -> "Result":
-        from dnet.commands.training_screen import TrainingBar  # noqa: PLC0415
-        from dnet.training.loop import EpochDone, StepDone, fit  # noqa: PLC0415
+        from dnet.commands.training_screen import TrainingBar
+        from dnet.training.loop import EpochDone, StepDone, fit
 
         with TrainingBar(console, epochs=self.epochs) as bar:
 
@@ -177,9 +177,9 @@ def _read(
     division: "Division", config: "DeformerNetConfig", *, seed: int, console: "Console"
 ) -> "tuple[Frames, Frames]":
     """Return the training and the validation frames, with a progress bar."""
-    from dnet.commands.progress import progress  # noqa: PLC0415
-    from dnet.training.episodes import open_each  # noqa: PLC0415
-    from dnet.training.frames import read_frames, samplings_for  # noqa: PLC0415
+    from dnet.commands.progress import progress
+    from dnet.training.episodes import open_each
+    from dnet.training.frames import read_frames, samplings_for
 
     learned, judged = (
         sum(survey.frames for survey in part) for part in (division.training, division.validation)
