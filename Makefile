@@ -11,6 +11,21 @@ TORCH_CPU_INDEX := https://download.pytorch.org/whl/cpu
 LIBRARIES := libusb-1.0-0 libgl1 libegl1 libgomp1 mesa-vulkan-drivers libxkbcommon0 \
 	libxkbcommon-x11-0 libwayland-client0 libxcursor1 libxi6 libxrandr2
 
+# Install those of some Debian packages that are missing, or say which command does.
+define provide
+missing=""; for package in $(1); do \
+	dpkg-query -W -f='$${Status}' $$package 2>/dev/null | grep -q "ok installed" || missing="$$missing $$package"; \
+done; \
+command="apt-get install -y --no-install-recommends$$missing"; \
+if [ -z "$$missing" ]; then true; \
+elif ! command -v apt-get >/dev/null; then echo "Not a Debian or Ubuntu: install what corresponds to$$missing"; \
+elif [ "$$(id -u)" = 0 ]; then \
+	(apt-get update -qq && DEBIAN_FRONTEND=noninteractive $$command -qq >/dev/null) || echo "That failed; run: $$command"; \
+elif sudo -n true 2>/dev/null; then \
+	(sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive $$command -qq >/dev/null) || echo "That failed; run: sudo $$command"; \
+else echo "Run: sudo $$command"; fi
+endef
+
 .DEFAULT_GOAL := help
 .PHONY: help setup develop libraries demo test check format lint type layers build clean
 
@@ -21,7 +36,8 @@ setup: $(VENV)/.run libraries ## Make .venv with what dnet needs to run; again: 
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not here: apt-get install python3.11 python3.11-venv, or make PYTHON=/path/to/python3.11"; exit 1; }
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { $(call provide,python3.11-venv); }
+	test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV)
 	@if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then \
 		$(INSTALL) "torch==$(TORCH)"; \
 	else \
@@ -39,21 +55,7 @@ $(VENV)/.develop: $(VENV)/.run
 develop: setup $(VENV)/.develop ## The same, and what its tests and checks need
 
 libraries: ## Install the system libraries of Open3D and Rerun, or say what to run
-	@missing=""; for library in $(LIBRARIES); do \
-		dpkg-query -W -f='$${Status}' $$library 2>/dev/null | grep -q "ok installed" || missing="$$missing $$library"; \
-	done; \
-	if [ -z "$$missing" ]; then exit 0; fi; \
-	if ! command -v apt-get >/dev/null; then \
-		echo "Not a Debian or Ubuntu: install the equivalents of$$missing"; \
-	elif [ "$$(id -u)" = 0 ]; then \
-		apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing >/dev/null \
-			|| echo "Could not install them; run: apt-get install --no-install-recommends$$missing"; \
-	elif sudo -n true 2>/dev/null; then \
-		sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing >/dev/null \
-			|| echo "Could not install them; run: sudo apt-get install --no-install-recommends$$missing"; \
-	else \
-		echo "For pictures without a screen, run: sudo apt-get install --no-install-recommends$$missing"; \
-	fi
+	@$(call provide,$(LIBRARIES))
 
 demo: setup ## Record, train, servo and play on a small scale; results in demo/
 	$(BIN)/dnet demo
