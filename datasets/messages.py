@@ -9,18 +9,36 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
+from jaxtyping import Float32, Float64, UInt8
+from scipy.spatial.transform import Rotation
 
-from dnet.types import ARMS, EpisodeMeta, FrameKind, Joints, Point, Scene, Transform
+from dnet.geometry.pose import pose
+from dnet.types import (
+    ARMS,
+    EpisodeMeta,
+    FrameKind,
+    Joints,
+    Point,
+    Pose,
+    Scene,
+    Tissue,
+    TissueShape,
+    Transform,
+)
 
 UNREADABLE = (ValueError, TypeError, KeyError, OverflowError, RecursionError, DecodeError)
 JOINTS_PER_ARM = 6
+WORLD = "world"
 
 _KINDS = get_args(FrameKind)
+_SHAPES = get_args(TissueShape)
 
 
 def read_position(message: memoryview) -> Point:
@@ -52,6 +70,43 @@ def read_transforms(message: memoryview) -> list[Transform]:
         )
         for entry in FrameTransforms.FromString(bytes(message)).transforms
     ]
+
+
+def read_calibration(message: memoryview) -> tuple[str, int, int, Float64[np.ndarray, "3 3"]]:
+    """Return frame, width, height and the matrix K of a foxglove.CameraCalibration."""
+    calibration = CameraCalibration.FromString(bytes(message))
+    if (
+        len(calibration.K) != 9
+        or not np.isfinite(calibration.K).all()
+        or not all((calibration.width, calibration.height, calibration.K[0], calibration.K[4]))
+    ):
+        raise ValueError("no pinhole camera")
+    intrinsics = np.array(calibration.K).reshape(3, 3)
+    return calibration.frame_id, calibration.width, calibration.height, intrinsics
+
+
+def read_depth(message: memoryview) -> Float32[np.ndarray, "h w"]:
+    """Return the distances in a foxglove.RawImage of float32, read-only."""
+    depth = _read_pixels(message, "32FC1", np.dtype("<f4"))
+    if not np.isfinite(depth).all():
+        raise ValueError("a depth of NaN or infinity")
+    return depth
+
+
+def read_mask(message: memoryview) -> UInt8[np.ndarray, "h w"]:
+    """Return the numbers in a foxglove.RawImage of bytes, read-only."""
+    return _read_pixels(message, "mono8", np.dtype("u1"))
+
+
+def read_pose(message: memoryview, *, frame: str) -> Pose:
+    """Return where `frame` stands in the world, of a foxglove.FrameTransforms."""
+    for entry in read_transforms(message):
+        if (entry.parent, entry.child) == (WORLD, frame):
+            rotation = Rotation.from_quat(entry.rotation).as_matrix()
+            placed = pose(rotation, entry.translation)
+            if np.isfinite(placed).all():
+                return placed
+    raise ValueError(f"it does not say where {frame[:40]!r} stands in {WORLD!r}")
 
 
 def read_line(message: memoryview) -> str:
@@ -90,14 +145,37 @@ def read_meta(record: Mapping[str, str]) -> EpisodeMeta:
             yaw=float(scene["yaw"]),
             hold=_numbers(scene["hold"], 3),
             manipulation_point=_numbers(scene["manipulation_point"], 3),
+            tissue=_read_tissue(scene["tissue"]),
         ),
         settings=dict(json.loads(record["settings"])),
+    )
+
+
+def _read_tissue(record: Mapping[str, Any]) -> Tissue:
+    if record["shape"] not in _SHAPES:
+        raise ValueError(f"an object of shape {str(record['shape'])[:40]!r}")
+    cells = _numbers(record["cells"], 3)
+    return Tissue(
+        shape=record["shape"],
+        size=_numbers(record["size"], 3),
+        cells=(int(cells[0]), int(cells[1]), int(cells[2])),
+        young=_finite(record["young"]),
+        poisson=_finite(record["poisson"]),
+        density=_finite(record["density"]),
     )
 
 
 def read_result(record: Mapping[str, str]) -> dict[str, Any]:
     """Return what the metadata `dnet.result` says."""
     return {key: json.loads(value) for key, value in record.items()}
+
+
+def _read_pixels(message: memoryview, encoding: str, dtype: np.dtype[Any]) -> Any:
+    image = RawImage.FromString(bytes(message))
+    step = image.width * dtype.itemsize
+    if (image.encoding, image.step, len(image.data)) != (encoding, step, image.height * step):
+        raise ValueError(f"no image of {image.width} x {image.height} pixels in {encoding}")
+    return np.frombuffer(image.data, dtype).reshape(image.height, image.width)
 
 
 def _numbers(values: Any, count: int) -> Any:

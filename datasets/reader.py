@@ -1,7 +1,7 @@
 """One episode file, read at random: its frames by number, each cloud a view of the file."""
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
@@ -13,12 +13,14 @@ from dnet.datasets import messages
 from dnet.datasets.mcap_file import Entries, McapFile
 from dnet.datasets.point_cloud import read_point_cloud
 from dnet.errors import BadEpisode, MissingPath, NoSuchFrame
-from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Nodes, Transform
+from dnet.geometry.camera import Pinhole
+from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Look, Nodes, Transform
 
 SCHEMA_VERSION = "1"
 
 CLOUD, NODES, GOAL, POINT = "/cloud/current", "/cloud/nodes", "/cloud/goal", "/manipulation_point"
 JOINTS, TRANSFORMS, GRIPPER = "/joint_states", "/tf", "/gripper"
+CALIBRATION, DEPTH, MASK = "/camera/calibration", "/camera/depth", "/camera/mask"
 FRAME, STEP, LOG = "/frame", "/step", "/log"
 FRAME_TOPICS = (CLOUD, NODES, POINT, JOINTS, TRANSFORMS, GRIPPER, FRAME)
 """What a frame consists of; one that lacks any of them does not count."""
@@ -132,16 +134,45 @@ class EpisodeReader:
             grasp=self._message(GRIPPER, index, messages.read_position),
             joints=self._message(JOINTS, index, messages.read_joints),
             nodes=self.nodes(index),
+            image=self.image(index),
         )
 
+    def image(self, index: int) -> Look | None:
+        """Return what the camera saw at frame `index`, or None where that was not kept.
+
+        Raises:
+            NoSuchFrame: If there is no such frame.
+            BadEpisode: If a message is no image, or depth and mask do not go together.
+        """
+        depth = self._beside(DEPTH, index, messages.read_depth)
+        mask = self._beside(MASK, index, messages.read_mask)
+        if depth is None and mask is None:
+            return None
+        if depth is None or mask is None or depth.shape != mask.shape:
+            raise self._bad(MASK, f"at frame {index} it does not go with {DEPTH}")
+        return Look(depth, mask)
+
     def transforms(self, index: int) -> list[Transform]:
-        """Return where every link of both arms stands at frame `index`.
+        """Return where every link of both arms, and the camera, stands at frame `index`.
 
         Raises:
             NoSuchFrame: If there is no such frame.
             BadEpisode: If the message is not a list of transforms.
         """
         return self._message(TRANSFORMS, index, messages.read_transforms)
+
+    def camera(self) -> Pinhole | None:
+        """Return what looked at the object; None where no camera or no frame was logged.
+
+        Raises:
+            BadEpisode: If its calibration is none, or does not say where it stands.
+        """
+        calibrations = self._all(CALIBRATION, messages.read_calibration)
+        if not calibrations or not len(self):
+            return None
+        name, width, height, intrinsics = calibrations[0][1]
+        pose = self._message(TRANSFORMS, 0, partial(messages.read_pose, frame=name))
+        return Pinhole(width, height, intrinsics, pose)
 
     def goal(self) -> Cloud | None:
         """Return the shape to reach, or None for a recording without one."""
@@ -212,6 +243,26 @@ class EpisodeReader:
         if not 0 <= index < len(self):
             raise NoSuchFrame(self.path, index, len(self))
         return self._at(topic, self._entries[topic][index].tolist(), read)
+
+    def _beside(
+        self, topic: str, index: int, read: Callable[[memoryview], _Value]
+    ) -> _Value | None:
+        """Return the value at a frame of a topic that frames need not have."""
+        if not 0 <= index < len(self):
+            raise NoSuchFrame(self.path, index, len(self))
+        stamps = self._entries[FRAME][: len(self), 0]
+        there = self._images[topic]
+        there = there[there[:, 0] == stamps[index]]
+        if not len(there):
+            return None
+        fellows = np.flatnonzero(stamps == stamps[index])
+        if len(there) != len(fellows):
+            raise self._bad(topic, "its messages do not match the frames")
+        return self._at(topic, there[index - int(fellows[0])].tolist(), read)
+
+    @cached_property
+    def _images(self) -> dict[str, Entries]:
+        return {topic: self._file.entries(topic) for topic in (DEPTH, MASK)}
 
     def _all(self, topic: str, read: Callable[[memoryview], _Value]) -> list[tuple[float, _Value]]:
         """Return seconds and value of every message of a topic that frames need not have."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32, Float64, UInt8
 
 Cloud = Float32[np.ndarray, "_ 3"]
 Nodes = Float32[np.ndarray, "_ 3"]
@@ -36,6 +36,30 @@ class Transform(NamedTuple):
     """Unit quaternion, x y z w."""
 
 
+TissueShape = Literal["box", "cylinder", "hemi_ellipsoid"]
+"""`cylinder`: lying, its axis along x; `hemi_ellipsoid`: upper half, its flat side down."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tissue:
+    """The deformable object: its shape and size at rest, its mesh and its material.
+
+    The defaults are the paper's: a soft box of 1 kPa, Poisson's ratio 0.3.
+    """
+
+    shape: TissueShape = "box"
+    size: tuple[float, float, float] = (0.10, 0.10, 0.04)
+    """Length along its own x, y and z, in metres; the holding arm grips its end at least x."""
+    cells: tuple[int, int, int] = (8, 8, 4)
+    """Mesh cells along each axis."""
+    young: float = 1000.0
+    """Young's modulus in pascals."""
+    poisson: float = 0.3
+    """Poisson's ratio."""
+    density: float = 1000.0
+    """In kg/m^3."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """One initial configuration and manipulation point: what an episode starts from."""
@@ -48,6 +72,19 @@ class Scene:
     """The point that the holding arm grips."""
     manipulation_point: tuple[float, float, float]
     """The point that the moving arm grasps and displaces."""
+    tissue: Tissue = field(default_factory=Tissue)
+    """The object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the depth camera saw, pixel by pixel, row by row from the upper left."""
+
+    depth: Float32[np.ndarray, "h w"]
+    """Distance along the optical axis in metres; the camera's far limit where nothing is."""
+    mask: UInt8[np.ndarray, "h w"]
+    """What each pixel shows: 0 nothing, 1 the object, 2 and more the other bodies, each with a
+    number of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +102,8 @@ class Frame:
     """Joint positions of the holding and the moving arm, in the order of `ARMS`."""
     nodes: Nodes
     """Mesh nodes of the simulator: ground truth for scores, never for a network, (m, 3)."""
+    image: Look | None = None
+    """What `cloud` was made from, where it is kept."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,16 +2,23 @@
 
 The topics, all in the world frame with log times in nanoseconds of simulation from zero:
 
-    /cloud/current       foxglove.PointCloud       the visible surface
-    /cloud/nodes         foxglove.PointCloud       mesh nodes, the simulator's ground truth
-    /cloud/goal          foxglove.PointCloud       the shape to reach; servo runs only
-    /manipulation_point  foxglove.PointCloud       one coloured point, for viewers
-    /joint_states        foxglove.JointStates      "psm_left/yaw" and so on
-    /tf                  foxglove.FrameTransforms  every link of both arms
-    /gripper             foxglove.PoseInFrame      tip of the moving arm's jaws
-    /frame               dnet.Frame (JSON)         index, kind, time; ends each frame
-    /step                dnet.Step (JSON)          one turn of the servo loop; servo runs only
-    /log                 foxglove.Log              lines for people
+    /cloud/current       foxglove.PointCloud         the visible surface
+    /cloud/nodes         foxglove.PointCloud         mesh nodes, the simulator's ground truth
+    /cloud/goal          foxglove.PointCloud         the shape to reach; servo runs only
+    /manipulation_point  foxglove.PointCloud         one coloured point, for viewers
+    /joint_states        foxglove.JointStates        "psm_left/yaw" and so on
+    /tf                  foxglove.FrameTransforms    every link of both arms, and the camera
+    /gripper             foxglove.PoseInFrame        tip of the moving arm's jaws
+    /camera/calibration  foxglove.CameraCalibration  once, at time 0, if there is a camera
+    /camera/depth        foxglove.RawImage           32FC1, metres; only where frames keep images
+    /camera/mask         foxglove.RawImage           mono8: 0 nothing, 1 the object, 2 and more
+                                                     other bodies; goes with each depth
+    /frame               dnet.Frame (JSON)           index, kind, time; ends each frame
+    /step                dnet.Step (JSON)            one turn of the servo loop; servo runs only
+    /log                 foxglove.Log                lines for people
+
+Pixel (u, v), counted from 0 at the upper left, looks along inv(K) @ (u, v, 1) in the frame
+"camera" (x right, y down, z forward), with no half pixel added; depth is along its z.
 
 Metadata `dnet.episode` comes first and survives a crash; `dnet.result` comes last, and its
 absence says that the recording did not end by itself.
@@ -27,6 +34,8 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dnet.errors import BackInTime, BadNumber, OccupiedOutput
+from dnet.geometry.camera import Camera
+from dnet.geometry.pose import transform
 from dnet.recorders import messages
 from dnet.recorders.arms import TIP, ArmModel, orientation_in_world
 from dnet.recorders.json_text import to_json
@@ -51,6 +60,7 @@ class EpisodeWriter:
         meta: What is known of it beforehand.
         arms: Both arms.
         attachments: Files to carry along, by name: the URDF "psm.urdf", settings, a mesh.
+        camera: What looks at the object; None leaves `/camera` out.
 
     Raises:
         OccupiedOutput: If `path` is already there.
@@ -63,18 +73,23 @@ class EpisodeWriter:
         *,
         arms: ArmModel,
         attachments: Mapping[str, bytes],
+        camera: Camera | None = None,
     ) -> None:
         if path.exists():
             raise OccupiedOutput(path, "an episode")
         self.path = path
         self.part = path.with_name(path.name + ".part")
         self._arms = arms
+        self._camera = camera
         self._times: list[int] = []
         path.parent.mkdir(parents=True, exist_ok=True)
         record = _meta_record(meta)
         self._sink = McapSink(self.part)
         try:
             self._sink.add_metadata("dnet.episode", record)
+            if camera is not None:
+                calibration = messages.camera_calibration(camera.pinhole, 0)
+                self._sink.put("/camera/calibration", calibration, 0)
             for name, content in attachments.items():
                 self._sink.attach(name, content)
             self._sink.flush()
@@ -163,7 +178,9 @@ class EpisodeWriter:
 
     def _add(self, frame: Frame) -> None:
         now = _nanoseconds(frame.time)
-        transforms = self._arms.transforms(frame.joints)
+        transforms = [*self._arms.transforms(frame.joints)]
+        if self._camera is not None:
+            transforms.append(transform(messages.WORLD, messages.CAMERA, self._camera.pose))
         turned = orientation_in_world(transforms, TIP)
         point = messages.point_cloud(
             frame.grasp.astype(np.float32)[None], now, color=MANIPULATION_POINT_COLOR
@@ -179,6 +196,9 @@ class EpisodeWriter:
                 frame.grasp, UNTURNED if turned is None else turned, now
             ),
         }
+        if frame.image is not None:
+            made["/camera/depth"] = messages.raw_image(frame.image.depth, now)
+            made["/camera/mask"] = messages.raw_image(frame.image.mask, now)
         for topic, message in made.items():
             self._sink.put(topic, message, now)
         # Last of its frame: a reader that finds it finds all of the frame.
@@ -198,6 +218,8 @@ class EpisodeWriter:
             "holding arm": frame.joints[0],
             "moving arm": frame.joints[1],
         }
+        if frame.image is not None:
+            values["depth"] = frame.image.depth
         for what, value in values.items():
             if not np.isfinite(value).all():
                 raise BadNumber(self.path, what, frame.time)

@@ -1,6 +1,5 @@
 """An MCAP file in the making: channels that register themselves, chunks that reach the disk."""
 
-import mimetypes
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +13,8 @@ from dnet.recorders.json_text import to_json
 from dnet.recorders.schemas import JSON_SCHEMAS
 
 CHUNK_SIZE = 256 * 1024
+MEDIA_TYPES = {".json": "application/json", ".urdf": "application/xml", ".vtk": "text/plain"}
+"""By suffix of an attachment; what the system knows of them differs from machine to machine."""
 
 
 class McapSink:
@@ -65,7 +66,7 @@ class McapSink:
 
     def attach(self, name: str, content: bytes) -> None:
         """Write an attached file."""
-        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        kind = MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
         self._writer.add_attachment(0, 0, name, kind, content)
 
     def flush(self) -> None:

@@ -3,17 +3,22 @@
 from collections.abc import Sequence
 
 import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
-from jaxtyping import Float64
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from jaxtyping import Float32, Float64, UInt8
 
+from dnet.geometry.camera import Pinhole
 from dnet.types import ARMS, Cloud, Joints, Point, Transform
 
 WORLD = "world"
+CAMERA = "camera"
+"""The camera's frame: x right, y down, z forward."""
 
 Color = tuple[int, int, int]
 
@@ -73,6 +78,42 @@ def pose_in_world(
     message = PoseInFrame(frame_id=WORLD)
     message.timestamp.FromNanoseconds(nanoseconds)
     _set_pose(message.pose.position, message.pose.orientation, position, rotation)
+    return message
+
+
+def camera_calibration(camera: Pinhole, nanoseconds: int) -> CameraCalibration:
+    """Return how the pixels of `camera` look into its frame.
+
+    K takes camera coordinates to pixel indices, counted from 0 at the upper left: pixel (u, v)
+    looks along inv(K) @ (u, v, 1), with no half pixel added.
+    """
+    message = CameraCalibration(frame_id=CAMERA, width=camera.width, height=camera.height)
+    message.timestamp.FromNanoseconds(nanoseconds)
+    # Foxglove has no name for a lens without distortion: this one has five coefficients of 0.
+    message.distortion_model = "plumb_bob"
+    message.D.extend([0.0] * 5)
+    message.K.extend(camera.intrinsics.ravel().tolist())
+    message.R.extend(np.eye(3).ravel().tolist())
+    message.P.extend(np.pad(camera.intrinsics, ((0, 0), (0, 1))).ravel().tolist())
+    return message
+
+
+def raw_image(
+    pixels: Float32[np.ndarray, "h w"] | UInt8[np.ndarray, "h w"], nanoseconds: int
+) -> RawImage:
+    """Return an image of little-endian float32, or of bytes, seen by the camera."""
+    height, width = pixels.shape
+    bytewise = pixels.dtype == np.uint8
+    packed = np.ascontiguousarray(pixels, dtype="u1" if bytewise else "<f4")
+    message = RawImage(
+        frame_id=CAMERA,
+        width=width,
+        height=height,
+        encoding="mono8" if bytewise else "32FC1",
+        step=width * packed.itemsize,
+        data=packed.tobytes(),
+    )
+    message.timestamp.FromNanoseconds(nanoseconds)
     return message
 
 

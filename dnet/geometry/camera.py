@@ -10,6 +10,29 @@ from dnet.geometry.pose import look_at
 from dnet.types import Cloud, Pose
 
 
+@dataclass(frozen=True, eq=False)
+class Pinhole:
+    """Where each pixel of a camera looks: all that turning depth back into points takes."""
+
+    width: int
+    """Pixels across."""
+    height: int
+    """Pixels down."""
+    intrinsics: Float64[np.ndarray, "3 3"]
+    """The matrix K: pixel (u, v), counted from 0 at the upper left, looks along
+    inv(K) @ (u, v, 1), with no half pixel added."""
+    pose: Pose
+    """Camera in the world: x right, y down, z forward, (4, 4)."""
+
+    def points(self, depth: Float32[np.ndarray, "h w"], chosen: Bool[np.ndarray, "h w"]) -> Cloud:
+        """Return the points in the world that the chosen pixels show, row by row, (n, 3)."""
+        v, u = np.nonzero(chosen)
+        z = depth[v, u].astype(np.float64)
+        rays = np.linalg.inv(self.intrinsics) @ np.stack([u, v, np.ones_like(u)])
+        world = self.pose[:3, :3] @ (rays * z) + self.pose[:3, 3:]
+        return np.ascontiguousarray(world.T, dtype=np.float32)
+
+
 @dataclass(frozen=True)
 class Camera:
     """A pinhole camera above the table, in front of the object."""
@@ -18,7 +41,7 @@ class Camera:
     """Pixels across."""
     height: int = 192
     """Pixels down."""
-    field_of_view: float = 0.46
+    field_of_view: float = 0.52
     """Vertical opening angle in radians."""
     eye: tuple[float, float, float] = (0.0, -0.30, 0.42)
     """Where the camera stands, in metres."""
@@ -50,6 +73,11 @@ class Camera:
         f = self.focal_length
         return np.array([[f, 0.0, self.width / 2], [0.0, f, self.height / 2 - 1], [0.0, 0.0, 1.0]])
 
+    @cached_property
+    def pinhole(self) -> Pinhole:
+        """Where each of its pixels looks."""
+        return Pinhole(self.width, self.height, self.intrinsics, self.pose)
+
 
 @dataclass(frozen=True)
 class DepthImage:
@@ -64,9 +92,4 @@ class DepthImage:
 
 def unproject(image: DepthImage, chosen: Bool[np.ndarray, "h w"]) -> Cloud:
     """Return the points in the world that the chosen pixels show, row by row, (n, 3)."""
-    camera = image.camera
-    v, u = np.nonzero(chosen)
-    z = image.depth[v, u].astype(np.float64)
-    rays = np.linalg.inv(camera.intrinsics) @ np.stack([u, v, np.ones_like(u)])
-    world = camera.pose[:3, :3] @ (rays * z) + camera.pose[:3, 3:]
-    return np.ascontiguousarray(world.T, dtype=np.float32)
+    return image.camera.pinhole.points(image.depth, chosen)

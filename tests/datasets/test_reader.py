@@ -1,17 +1,23 @@
 import json
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BadEpisode, MissingPath, NoSuchFrame
+from dnet.geometry.camera import Camera
+from dnet.recorders.messages import frame_transforms
 from dnet.sim.urdf import psm_urdf
-from tests.recorders.rollout import ARMS, frames, meta, write, write_servo
+from dnet.types import Transform
+from tests.recorders.rollout import ARMS, frames, meta, with_image, write, write_servo
 
 Change = Callable[[str, int, bytes], bytes | None]
 
@@ -90,6 +96,137 @@ def test_transforms_are_those_of_the_arms(tmp_path: Path) -> None:
                 assert (read.parent, read.child) == (wanted.parent, wanted.child)
                 np.testing.assert_array_equal(read.translation, wanted.translation)
                 np.testing.assert_array_equal(read.rotation, wanted.rotation)
+
+
+def camera_at(rotation: list[float], height: float) -> bytes:
+    entry = Transform("world", "camera", np.array([0.0, 0.0, height]), np.array(rotation))
+    return frame_transforms([entry], 0).SerializeToString()
+
+
+def test_the_camera_comes_back(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24, eye=(0.05, -0.3, 0.4))
+    with EpisodeReader(write(tmp_path / "a.mcap", frames(2), camera=camera)) as episode:
+        read = episode.camera()
+    assert read is not None
+    assert (read.width, read.height) == (32, 24)
+    np.testing.assert_array_equal(read.intrinsics, camera.intrinsics)
+    np.testing.assert_allclose(read.pose, camera.pose, atol=1e-12)
+
+
+def test_without_a_camera_or_a_frame_there_is_none_to_read(tmp_path: Path) -> None:
+    with EpisodeReader(write(tmp_path / "a.mcap", frames(2))) as episode:
+        assert episode.camera() is None
+    with EpisodeReader(write(tmp_path / "b.mcap", [], camera=Camera())) as episode:
+        assert episode.camera() is None
+
+
+@pytest.mark.parametrize(
+    ("topic", "content"),
+    [
+        ("/camera/calibration", b""),
+        ("/camera/calibration", b"\xff\xff"),
+        ("/camera/calibration", CameraCalibration(K=[1.0] * 9).SerializeToString()),
+        ("/camera/calibration", CameraCalibration(
+            width=4, height=3, K=[np.nan] * 9).SerializeToString()),
+        ("/camera/calibration", CameraCalibration(
+            width=4, height=3, K=[0.0] * 9).SerializeToString()),
+        ("/tf", b""),
+        ("/tf", camera_at([0.0, 0.0, 0.0, 0.0], 0.1)),
+        ("/tf", camera_at([0.0, 0.0, 0.0, 1.0], np.nan)),
+    ],
+)  # fmt: skip
+def test_a_spoiled_camera_is_refused(tmp_path: Path, topic: str, content: bytes) -> None:
+    source = write(tmp_path / "a.mcap", frames(2), camera=Camera())
+    spoiled = rewrite(
+        source, tmp_path / "b.mcap", lambda name, _, old: content if name == topic else old
+    )
+    with (
+        EpisodeReader(spoiled) as episode,
+        pytest.raises(BadEpisode, match=f"b.mcap has an unreadable {topic}"),
+    ):
+        episode.camera()
+
+
+def test_images_come_back_with_their_own_frames(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    seen = frames(4)
+    for index in (1, 2, 5):
+        seen[index] = with_image(seen[index], camera, seed=index)
+    # Two looks at one instant.
+    seen[2] = replace(seen[2], time=seen[1].time)
+    with EpisodeReader(write(tmp_path / "a.mcap", seen, camera=camera)) as episode:
+        for index, one in enumerate(seen):
+            read, whole = episode.image(index), episode.frame(index).image
+            if one.image is None:
+                assert read is None
+                assert whole is None
+                continue
+            assert read is not None
+            assert whole is not None
+            assert read.depth.dtype == np.float32
+            assert read.mask.dtype == np.uint8
+            np.testing.assert_array_equal(read.depth, one.image.depth)
+            np.testing.assert_array_equal(read.mask, one.image.mask)
+            np.testing.assert_array_equal(whole.depth, one.image.depth)
+        with pytest.raises(NoSuchFrame):
+            episode.image(len(seen))
+
+
+def test_an_image_and_the_camera_give_the_points_that_were_seen(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    one = with_image(frames(2)[0], camera)
+    assert one.image is not None
+    with EpisodeReader(write(tmp_path / "a.mcap", [one], camera=camera)) as episode:
+        view, image = episode.camera(), episode.image(0)
+    assert view is not None
+    assert image is not None
+    chosen = one.image.mask == 1
+    np.testing.assert_allclose(
+        view.points(image.depth, image.mask == 1),
+        camera.pinhole.points(one.image.depth, chosen),
+        atol=1e-7,
+    )
+
+
+@pytest.mark.parametrize(
+    ("topic", "content"),
+    [
+        ("/camera/depth", b""),
+        ("/camera/depth", b"\xff\xff"),
+        ("/camera/depth", None),
+        ("/camera/mask", None),
+        ("/camera/mask", RawImage(
+            width=2, height=2, step=2, encoding="mono8", data=bytes(4)).SerializeToString()),
+        ("/camera/mask", RawImage(
+            width=32, height=24, step=32, encoding="rgb8", data=bytes(768)).SerializeToString()),
+        ("/camera/depth", RawImage(
+            width=32, height=24, step=128, encoding="32FC1", data=bytes(8)).SerializeToString()),
+        ("/camera/depth", RawImage(width=32, height=24, step=128, encoding="32FC1",
+            data=b"\xff" * 3072).SerializeToString()),
+    ],
+)  # fmt: skip
+def test_a_spoiled_image_is_refused(tmp_path: Path, topic: str, content: bytes | None) -> None:
+    camera = Camera(width=32, height=24)
+    source = write(tmp_path / "a.mcap", [with_image(frames(2)[0], camera)], camera=camera)
+    spoiled = rewrite(
+        source, tmp_path / "b.mcap", lambda name, _, old: content if name == topic else old
+    )
+    with (
+        EpisodeReader(spoiled) as episode,
+        pytest.raises(BadEpisode, match="has an unreadable /camera/"),
+    ):
+        episode.image(0)
+
+
+def test_images_that_could_belong_to_either_of_two_frames_are_refused(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    first = frames(2)[0]
+    seen = [first, with_image(first, camera)]
+    with (
+        EpisodeReader(write(tmp_path / "a.mcap", seen, camera=camera)) as episode,
+        pytest.raises(BadEpisode, match=r"unreadable /camera/depth .*do not match the frames"),
+    ):
+        episode.image(1)
 
 
 def test_arrays_cannot_be_changed_by_mistake(tmp_path: Path) -> None:

@@ -1,15 +1,17 @@
 """A made-up rollout: a box bent by a formula, held and pulled by the real arms' kinematics."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from dnet.geometry.camera import Camera
 from dnet.geometry.chamfer import chamfer
 from dnet.recorders.episode import EpisodeWriter
 from dnet.sim.arms import ArmModel, Placement
 from dnet.sim.urdf import psm_urdf
-from dnet.types import EpisodeMeta, Frame, FrameKind, Plan, Point, Scene, Step
+from dnet.types import EpisodeMeta, Frame, FrameKind, Look, Plan, Point, Scene, Step
 
 ARMS = ArmModel(Placement())
 HOLD = np.array([-0.045, 0.0, 0.04])
@@ -57,6 +59,14 @@ def frames(count: int = 5, *, seed: int = 0, points: int = 64) -> list[Frame]:
     return found
 
 
+def with_image(one: Frame, camera: Camera, *, seed: int = 0) -> Frame:
+    """The frame with an image in which nothing but the size is likely."""
+    rng = np.random.default_rng(seed)
+    shape = (camera.height, camera.width)
+    depth = rng.uniform(0.3, 0.5, shape).astype(np.float32)
+    return replace(one, image=Look(depth, rng.integers(0, 5, shape).astype(np.uint8)))
+
+
 def step(seen: Frame, goal: Frame, *, planned: bool = True) -> Step:
     motion = goal.grasp - seen.grasp
     plan = None
@@ -75,10 +85,14 @@ def step(seen: Frame, goal: Frame, *, planned: bool = True) -> Step:
     return Step(frame=seen, chamfer=chamfer(seen.cloud, goal.cloud), motion=motion, plan=plan)
 
 
-def write(path: Path, seen: Sequence[Frame], *, name: str | None = None) -> Path:
+def write(
+    path: Path, seen: Sequence[Frame], *, name: str | None = None, camera: Camera | None = None
+) -> Path:
     """Write a finished recording with the arms' URDF attached."""
     attachments = {"psm.urdf": psm_urdf().encode(), "config.json": b"{}"}
-    with EpisodeWriter(path, meta(name or path.stem), arms=ARMS, attachments=attachments) as writer:
+    with EpisodeWriter(
+        path, meta(name or path.stem), arms=ARMS, attachments=attachments, camera=camera
+    ) as writer:
         for one in seen:
             writer.add(one)
         writer.finish({"frames": len(seen), "rejected": {"folded": 2}})

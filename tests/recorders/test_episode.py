@@ -1,5 +1,6 @@
 import json
 import subprocess
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from rerun.chunk import McapReader
 
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BackInTime, BadNumber, OccupiedOutput
+from dnet.geometry.camera import Camera
+from dnet.geometry.pose import look_at
 from dnet.recorders.arms import orientation_in_world
 from dnet.recorders.episode import EpisodeWriter
 from dnet.recorders.viewer import RERUN
@@ -23,6 +27,7 @@ from tests.recorders.rollout import (
     frames,
     meta,
     step,
+    with_image,
     write,
     write_servo,
 )
@@ -136,6 +141,78 @@ def test_the_gripper_is_turned_as_its_tool(tmp_path: Path) -> None:
     )
 
 
+def test_a_camera_is_described_once_before_all_else(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    path = write(tmp_path / "a.mcap", frames(3), camera=camera)
+    ((time, message),) = decoded(path, "/camera/calibration")
+    assert time == 0
+    assert (message.frame_id, message.width, message.height) == ("camera", 32, 24)
+    assert message.distortion_model == "plumb_bob"
+    assert list(message.D) == [0.0] * 5
+    np.testing.assert_array_equal(message.R, np.eye(3).ravel())
+    np.testing.assert_array_equal(message.K, camera.intrinsics.ravel())
+    projection = np.array(message.P).reshape(3, 4)
+    np.testing.assert_array_equal(projection[:, :3], camera.intrinsics)
+    np.testing.assert_array_equal(projection[:, 3], np.zeros(3))
+    with path.open("rb") as file:
+        first = next(make_reader(file).iter_messages(log_time_order=False))
+    assert first[1].topic == "/camera/calibration"
+
+
+def test_every_frame_says_where_the_camera_stands(tmp_path: Path) -> None:
+    camera = Camera(eye=(0.05, -0.3, 0.4))
+    seen = frames(3)
+    path = write(tmp_path / "a.mcap", seen, camera=camera)
+    plain = write(tmp_path / "b.mcap", seen)
+    wanted = look_at(np.array(camera.eye), np.array(camera.target))
+    for (_, message), (_, without) in zip(decoded(path, "/tf"), decoded(plain, "/tf"), strict=True):
+        *arms, entry = message.transforms
+        assert list(map(str, arms)) == list(map(str, without.transforms))
+        assert (entry.parent_frame_id, entry.child_frame_id) == ("world", "camera")
+        place = [getattr(entry.translation, axis) for axis in "xyz"]
+        np.testing.assert_array_equal(place, camera.eye)
+        x, y, z, w = (getattr(entry.rotation, axis) for axis in "xyzw")
+        forward = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+        np.testing.assert_allclose(forward, wanted[:3, 2], atol=1e-12)
+
+
+def test_images_are_logged_with_the_frames_that_have_them(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    seen = frames(3)
+    seen[1] = with_image(seen[1], camera)
+    path = write(tmp_path / "a.mcap", seen, camera=camera)
+    ((depth_time, depth),) = decoded(path, "/camera/depth")
+    ((mask_time, mask),) = decoded(path, "/camera/mask")
+    assert depth_time == mask_time == round(seen[1].time * 1e9)
+    image = seen[1].image
+    assert image is not None
+    for message, encoding, dtype, wanted in (
+        (depth, "32FC1", "<f4", image.depth),
+        (mask, "mono8", "u1", image.mask),
+    ):
+        assert (message.frame_id, message.encoding) == ("camera", encoding)
+        assert (message.width, message.height) == (32, 24)
+        assert message.step == 32 * np.dtype(dtype).itemsize
+        np.testing.assert_array_equal(np.frombuffer(message.data, dtype).reshape(24, 32), wanted)
+
+
+def test_rerun_hangs_the_images_on_the_camera_and_the_camera_in_the_world(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    path = write(tmp_path / "a.mcap", [with_image(frames(2)[0], camera)], camera=camera)
+    found: dict[tuple[str, str], Any] = {}
+    for chunk in McapReader(path).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            found[chunk.entity_path, name] = batch.column(name).to_pylist()
+    ((parent,),) = found["/camera/calibration", "Pinhole:parent_frame"]
+    ((plane,),) = found["/camera/calibration", "Pinhole:child_frame"]
+    assert [parent] in found["/tf", "Transform3D:child_frame"]
+    for topic in ("/camera/depth", "/camera/mask"):
+        assert found[topic, "CoordinateFrame:frame"] == [[plane]]
+        ((drawn,),) = found[topic, "Image:format"]
+        assert (drawn["width"], drawn["height"]) == (32, 24)
+
+
 def test_a_frame_that_hangs_on_itself_still_has_an_orientation() -> None:
     loop = [Transform("b", "a", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])),
             Transform("a", "b", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))]  # fmt: skip
@@ -163,14 +240,22 @@ def test_wall_times_do_not_change_the_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "slow").read_bytes() == (tmp_path / "fast").read_bytes()
 
 
-def test_rerun_checks_it_without_complaint(tmp_path: Path) -> None:
-    path = write_servo(tmp_path / "run.mcap")
+def assert_rerun_accepts(path: Path, topics: Iterable[str]) -> None:
     command = [*RERUN, "mcap", "check", "--full", str(path)]
     checked = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert checked.returncode == 0, checked.stderr
-    for topic in (*TOPICS.keys() - {"/log"}, "/cloud/goal", "/step"):
+    for topic in topics:
         line = next(line for line in checked.stdout.splitlines() if f" {topic} " in line)
         assert line.startswith("ok"), line
+
+
+def test_rerun_checks_it_without_complaint(tmp_path: Path) -> None:
+    run = write_servo(tmp_path / "run.mcap")
+    assert_rerun_accepts(run, (*TOPICS.keys() - {"/log"}, "/cloud/goal", "/step"))
+    seen = [with_image(one, Camera()) for one in frames(2)]
+    recording = write(tmp_path / "a.mcap", seen, camera=Camera())
+    cameras = ("/camera/calibration", "/camera/depth", "/camera/mask")
+    assert_rerun_accepts(recording, (*TOPICS.keys() - {"/log"}, *cameras))
 
 
 def test_a_step_is_written_with_its_frame_and_only_once(tmp_path: Path) -> None:
@@ -292,6 +377,17 @@ def test_a_diverged_frame_is_refused_and_leaves_no_trace(
         writer.finish({})
     with EpisodeReader(tmp_path / "a.mcap") as episode:
         np.testing.assert_array_equal(episode.times, [good[0].time, good[2].time])
+
+
+def test_a_depth_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    camera = Camera(width=32, height=24)
+    spoiled = with_image(frames(2)[0], camera)
+    assert spoiled.image is not None
+    spoiled.image.depth[3, 4] = np.nan
+    with EpisodeWriter(tmp_path / "a.mcap", meta(), arms=ARMS, attachments={}) as writer:
+        with pytest.raises(BadNumber, match="depth"):
+            writer.add(spoiled)
+        assert len(writer) == 0
 
 
 def test_a_goal_with_holes_is_refused(tmp_path: Path) -> None:
