@@ -1,0 +1,59 @@
+"""A minimisation says truly how it ended."""
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from dnet.sim.elastic_energy import elements, energy_and_gradient
+from dnet.sim.envelope import factorised
+from dnet.sim.material import Lame
+from dnet.sim.quasi_newton import Descent, Limits, empty_memory, minimise
+from dnet.sim.tetrahedra import box_mesh
+
+MESH = box_mesh((0.04, 0.02, 0.02), (4, 2, 2))
+BODY = elements(MESH, Lame(mu=500.0, lam=900.0))
+FREE = len(MESH.nodes) - 9
+"""The last nodes are those of an end face: pinned."""
+IDENTITY = factorised(csr_array(30.0 * np.eye(FREE)))
+"""A poor guess of the Hessian, in N/m: what is learned on the way must make up for it."""
+
+
+def shaken() -> np.ndarray:
+    points = np.ascontiguousarray(MESH.nodes.T)
+    points[:, :FREE] += np.random.default_rng(0).normal(scale=2e-3, size=(3, FREE))
+    return points
+
+
+def descend(points: np.ndarray, *, patience: int) -> Descent:
+    return minimise(points, BODY, IDENTITY, empty_memory(FREE), Limits(1e-7, patience))
+
+
+def test_a_shaken_body_finds_back_to_rest() -> None:
+    points = shaken()
+    found = descend(points, patience=500)
+    assert found.converged
+    assert found.residual < 1e-7
+    np.testing.assert_allclose(points.T, MESH.nodes, atol=1e-5)
+
+
+def test_more_patience_means_less_energy() -> None:
+    energies = []
+    for patience in (0, 1, 2, 4, 8, 16):
+        points = shaken()
+        found = descend(points, patience=patience)
+        assert not found.converged
+        assert found.iterations == patience
+        energies.append(energy_and_gradient(points, BODY, np.empty_like(points)))
+    assert energies == sorted(energies, reverse=True)
+    assert energies[0] > energies[-1]
+
+
+def test_pinned_nodes_do_not_move() -> None:
+    points = shaken()
+    descend(points, patience=10)
+    np.testing.assert_array_equal(points[:, FREE:], MESH.nodes[FREE:].T)
+
+
+def test_what_is_not_a_number_does_not_pass_for_rest() -> None:
+    points = shaken()
+    points[0, 0] = np.nan
+    assert not descend(points, patience=10).converged
