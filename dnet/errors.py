@@ -211,3 +211,106 @@ class NoDevice(DnetError, RuntimeError):
 
     def __init__(self, name: str) -> None:
         super().__init__(f"device {name} is not there: torch finds no GPU; use --device cpu")
+
+
+class NoReachableSurface(DnetError, ValueError):
+    """An object of which no part can be grasped."""
+
+    def __init__(self, size: tuple[float, float, float], clearance: float) -> None:
+        length, width, height = (1e3 * edge for edge in size)
+        super().__init__(
+            f"no surface of an object of {length:.0f} x {width:.0f} x {height:.0f} mm is "
+            f"reachable: it must face the moving arm and lie {clearance * 1e3:.0f} mm from the "
+            "held end; make the object longer or the clearance smaller"
+        )
+
+
+class OtherRequest(DnetError, ValueError):
+    """A directory in which another recording began."""
+
+    def __init__(self, folder: Path, differences: list[str]) -> None:
+        shown = ", ".join(differences[:4]) + (", ..." if len(differences) > 4 else "")
+        super().__init__(
+            f"{folder} holds a recording with other settings ({shown}); repeat the call that "
+            "began it to go on with it, or choose another directory"
+        )
+
+
+class BadManifest(DnetError, ValueError):
+    """A manifest that does not say what was recorded."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        super().__init__(
+            f"{path} is no manifest of a recording: {why}; the episodes beside it are readable "
+            "by themselves, record into another directory"
+        )
+
+
+class DamagedEpisode(DnetError, ValueError):
+    """An episode that is not as long as it was when it was finished."""
+
+    def __init__(self, path: Path, got: int, want: int) -> None:
+        super().__init__(
+            f"{path} has {got} bytes, had {want} when it was finished; remove it, and the same "
+            "call records it again"
+        )
+
+
+class WorkerDied(DnetError, RuntimeError):
+    """A process that was to record and is no more."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(
+            f"a worker that recorded into {folder} was killed, perhaps for want of memory; "
+            "finished episodes are kept, the same call goes on; fewer --workers take less memory"
+        )
+
+
+class NoSpace(DnetError, OSError):
+    """A disk without room for what is to be written."""
+
+    def __init__(self, folder: Path, need: int, free: int) -> None:
+        super().__init__(
+            f"{folder} has {free / 1e9:.2f} GB free, the recording takes about "
+            f"{need / 1e9:.2f} GB; make room, choose another disk, or ask for fewer --pairs, "
+            "--shapes or frames on the way"
+        )
+
+
+class OutputInUse(DnetError, RuntimeError):
+    """A directory that another process records into."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(
+            f"another process records into {folder}; wait for it, or choose another directory"
+        )
+
+
+class UnknownPicture(DnetError, ValueError):
+    """A file name that says no kind of picture that we draw."""
+
+    def __init__(self, path: Path, endings: tuple[str, ...]) -> None:
+        super().__init__(
+            f"picture {path} ends in {path.suffix or 'nothing'}, must end in one of "
+            f"{', '.join(endings)}"
+        )
+
+
+class Unsettled(DnetError, RuntimeError):
+    """A simulated body that does not come to rest."""
+
+    def __init__(self, what: str, steps: int, moved: float) -> None:
+        super().__init__(
+            f"{what} still moved by {moved * 1e3:.3g} mm after {steps} steps; "
+            "its strains are too large, or its material is too stiff for the time step"
+        )
+
+
+class BrokenLimit(DnetError, RuntimeError):
+    """A validation that found figures outside their limits."""
+
+    def __init__(self, broken: list[str]) -> None:
+        super().__init__(
+            f"{len(broken)} of the material's limits broken: {'; '.join(broken)}; "
+            "don't record with this simulation before you know why"
+        )

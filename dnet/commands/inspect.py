@@ -6,6 +6,9 @@ from typing import Annotated
 
 import tyro
 
+from dnet.commands.inspect_material import Material
+from dnet.commands.inspect_stats import Stats
+
 
 @dataclass(frozen=True)
 class List:
@@ -61,15 +64,18 @@ class Info:
 
 @dataclass(frozen=True)
 class Inspect:
-    """Look at what was recorded: a directory of episodes, or one of them.
+    """Look at what was recorded: a directory of episodes, its figures, or one episode.
 
     Example: dnet inspect ls data/box
     """
 
     what: tyro.conf.OmitSubcommandPrefixes[
-        Annotated[List, tyro.conf.subcommand("ls")] | Annotated[Info, tyro.conf.subcommand("info")]
+        Annotated[List, tyro.conf.subcommand("ls")]
+        | Annotated[Info, tyro.conf.subcommand("info")]
+        | Annotated[Stats, tyro.conf.subcommand("stats")]
+        | Annotated[Material, tyro.conf.subcommand("material")]
     ]
 
     def run(self) -> None:
-        """Print the table that was asked for."""
+        """Print what was asked for."""
         self.what.run()

@@ -10,7 +10,7 @@ import tyro
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dnet.commands.laboratory import Laboratory
+    from dnet.laboratory import Laboratory
     from dnet.types import EpisodeMeta, FrameKind, Goal, Scene, Trace
 
 
@@ -50,7 +50,7 @@ class Servo:
         """
         from rich.console import Console
 
-        from dnet.commands.laboratory import laboratory
+        from dnet.laboratory import LaboratorySettings, laboratory
         from dnet.commands.servo_log import RECORDING, ServoLog
         from dnet.servo.loop import ServoSettings, servo
         from dnet.sim.observe import observe
@@ -60,7 +60,7 @@ class Servo:
         model = load(self.checkpoint)
         goal, scene = self._read_goal(model.config.points)
         console = Console()
-        with laboratory(model.config.points) as lab:
+        with laboratory(LaboratorySettings(points=model.config.points)) as lab:
             lab.world.reset(scene)
             lab.world.settle()
             kinds = _kinds()
@@ -116,7 +116,7 @@ class Servo:
         from dnet.types import EpisodeMeta
 
         name = f"servo-{goal.source.replace('.mcap:', '-')}"
-        settings = lab.describe() | {"goal": goal.source, "checkpoint": self.checkpoint.name}
+        settings = lab.settings.describe() | {"goal": goal.source, "checkpoint": self.checkpoint.name}
         return EpisodeMeta(name, self.seed, 0, scene, settings)
 
 

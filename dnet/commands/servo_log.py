@@ -7,7 +7,7 @@ from types import TracebackType
 import numpy as np
 from rich.console import Console
 
-from dnet.commands.laboratory import Laboratory
+from dnet.laboratory import Laboratory
 from dnet.recorders.episode import EpisodeWriter
 from dnet.recorders.rerun_run import RerunRun
 from dnet.recorders.step_text import describe_step
@@ -26,7 +26,13 @@ class ServoLog:
         self._arms, self._console = lab.arms, console
         self._files = ExitStack()
         self._episode = self._files.enter_context(
-            EpisodeWriter(out / EPISODE, meta, arms=lab.arms, attachments=lab.attachments())
+            EpisodeWriter(
+                out / EPISODE,
+                meta,
+                arms=lab.arms,
+                attachments=lab.attachments(meta.scene.tissue),
+                camera=lab.settings.bullet.camera,
+            )
         )
         self._recording = self._files.enter_context(
             RerunRun(out / RECORDING, name=meta.episode_id, arms=lab.arms, urdf=psm_urdf())

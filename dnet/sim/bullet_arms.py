@@ -36,7 +36,8 @@ class BulletArms:
         numbers = {info[1].decode(): info[0] for info in infos}
         self.links = {info[0]: info[12].decode() for info in infos}
         """Link name by Bullet's number, alike for both arms; the base is -1."""
-        self._driven = [(numbers[j.name], j) for j in LINK_JOINTS if j.kind != "fixed"]
+        self.driven = [(numbers[j.name], j) for j in LINK_JOINTS if j.kind != "fixed"]
+        """Every joint that moves, with Bullet's number, alike for both arms."""
 
     def touch_nothing(self) -> None:
         """Take both arms out of contact: jaws that press on a soft body stall the solver."""
@@ -51,7 +52,7 @@ class BulletArms:
 
     def show_one(self, arm: int, joints: Joints) -> None:
         """Put one arm at joint positions; Bullet does not move passive joints by itself."""
-        for number, joint in self._driven:
+        for number, joint in self.driven:
             pybullet.resetJointState(
                 self.bodies[arm], number, joint.position(joints), physicsClientId=self._client
             )

@@ -1,4 +1,4 @@
-"""The world in PyBullet: two kinematic arms, a soft box, a depth camera."""
+"""The world in PyBullet: two arms, a soft object, a depth camera."""
 
 from dataclasses import dataclass, field
 
@@ -12,55 +12,61 @@ from dnet.sim.arms import HOME, Placement
 from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
+from dnet.sim.bullet_grip import Drive, Grip
 from dnet.sim.furniture import TABLE
-from dnet.sim.scenes import SoftBox
+from dnet.sim.kinematic_grip import KinematicGrip
+from dnet.sim.material import wave_speed
+from dnet.sim.motor_grip import MotorGrip
+from dnet.sim.quasistatic import QuasistaticSolver
 from dnet.sim.soft_body import SoftBody
-from dnet.sim.tetrahedra import TetrahedralMesh, Vertices, box_mesh
+from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
+from dnet.sim.tissue import held_nodes, tissue_mesh
 from dnet.sim.world import Settling
-from dnet.types import JointPath, Joints, Nodes, Point, Pose, Scene
+from dnet.types import JointPath, Joints, Nodes, Point, Scene, Tissue
 
 
 @dataclass(frozen=True)
 class BulletSettings:
-    """Everything that shapes the world; the defaults are the paper's soft box."""
+    """Everything that shapes the world."""
 
-    box: SoftBox = field(default_factory=SoftBox)
     placement: Placement = field(default_factory=Placement)
     camera: Camera = field(default_factory=Camera)
+    drive: Drive = "kinematic"
+    """How the arms hold and grasp. `kinematic`: they are exactly where the path says, and what they
+    grip with them. `motor`: position motors drive them along the path within limits of force and
+    velocity, and what they grip is anchored to their wrists; slower, to the same shapes."""
     jaw_radius: float = 0.016
     """Nodes this near to the tip are between the jaws, in metres."""
-    courant: float = 0.7
-    """Time step as a share of cell size over 1 m/s; the body becomes unstable above 1.2."""
-    block: int = 20
+    courant: float = 1.5
+    """Time step as a multiple of the least altitude of a tetrahedron over the speed of sound in
+    the object; the body becomes unstable above 2.3."""
+    block: int = 15
     """Steps between two looks at whether the body has come to rest."""
     tolerance: float = 1e-4
     """The body rests when no node moves farther than this in a block, in metres."""
     patience: int = 2000
     """Steps after which settling is given up."""
 
-    @property
-    def time_step(self) -> float:
-        """Seconds a simulation step."""
-        cell = min(s / n for s, n in zip(self.box.size, self.box.cells, strict=True))
-        return self.courant * cell / 1.0
+    def time_step(self, tissue: Tissue) -> float:
+        """Return the seconds that a simulation step of an object may take."""
+        altitude = float(tissue_mesh(tissue).least_altitude())
+        return self.courant * altitude / wave_speed(tissue.young, tissue.poisson, tissue.density)
 
 
 class BulletWorld:
     """A `World` in PyBullet, without gravity, as the paper's simulation.
 
-    The arms are kinematic: they are exactly where the path says, and the nodes between the jaws
-    move rigidly with the tool. The nodes of the end face that the holding arm grips stay put.
-    Every reset starts a new simulation, so an episode does not depend on those before it.
+    The nodes between the moving arm's jaws go rigidly with them; the holding arm keeps the nodes
+    of the end that it grips. Every reset starts a new simulation, so an episode does not depend
+    on those before it.
     """
 
     def __init__(self, settings: BulletSettings | None = None) -> None:
         """Start a Bullet server of its own in this process."""
         self.settings = settings or BulletSettings()
-        self.mesh: TetrahedralMesh = box_mesh(self.settings.box.size, self.settings.box.cells)
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._time = 0.0
         self._joints = (HOME, HOME)
-        self._jaws: Pose = self.settings.placement.arms[1].forward(HOME)
         self.object_id = -1
 
     def close(self) -> None:
@@ -79,7 +85,8 @@ class BulletWorld:
         place = self.settings.placement
         hold = place.joints_at(0, np.array(scene.hold))
         grasp = place.joints_at(1, np.array(scene.manipulation_point))
-        nodes = _posed(self.mesh.nodes, scene, self.settings.box.size[2])
+        mesh = tissue_mesh(scene.tissue)
+        nodes = _posed(mesh.nodes, scene)
         gripped = _near(nodes, np.array(scene.manipulation_point), self.settings.jaw_radius)
         if not len(gripped):
             distance = float(np.linalg.norm(nodes - scene.manipulation_point, axis=1).min())
@@ -88,22 +95,28 @@ class BulletWorld:
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
         pybullet.setGravity(0, 0, 0, physicsClientId=client)
-        pybullet.setTimeStep(self.settings.time_step, physicsClientId=client)
+        self._step_time = self.settings.time_step(scene.tissue)
+        pybullet.setTimeStep(self._step_time, physicsClientId=client)
         # Bullet's grid for contact between soft bodies: none is in use, so coarse is cheap.
         pybullet.setPhysicsEngineParameter(sparseSdfVoxelSize=0.25, physicsClientId=client)
         self._body = SoftBody(
             client,
-            self.mesh,
-            young=self.settings.box.young,
-            poisson=self.settings.box.poisson,
-            density=self.settings.box.density,
+            mesh,
+            young=scene.tissue.young,
+            poisson=scene.tissue.poisson,
+            density=scene.tissue.density,
         )
         self.object_id = self._body.body
         self._rest = nodes
-        self._held = np.flatnonzero(self.mesh.nodes[:, 0] <= self.mesh.nodes[:, 0].min() + 1e-9)
+        self._mesh = mesh
+        self._held = held_nodes(mesh.nodes)
         self._gripped = np.setdiff1d(gripped, self._held)
-        self._arms = BulletArms(client, place)
-        self._arms.touch_nothing()
+        self._pinned = np.concatenate([self._held, self._gripped])
+        self._reference = QuasistaticSolver(
+            mesh, young=scene.tissue.young, poisson=scene.tissue.poisson
+        )
+        self._reference.hold(self._pinned)
+        self._grip = self._new_grip()
         add_picture(TABLE, client)
         self._grasped = (hold, grasp)
         self._time = 0.0
@@ -112,15 +125,13 @@ class BulletWorld:
     def restore(self) -> None:
         """Put the object back at rest and the arms where they grasped it; the clock goes on."""
         every = np.arange(len(self._rest))
-        self._body.release()
+        self._grip.release()
         self._body.place(every, self._rest)
         # Stopping takes a step, in which the nodes still drift at the speed they had.
         self._body.stop()
         self._body.place(every, self._rest)
-        self._body.pin(self._held)
-        self._body.pin(self._gripped)
-        self._joints = self._grasped
-        self._jaws = self.settings.placement.arms[1].forward(self._grasped[1])
+        self._grip.take(self._held, self._gripped, joints=self._grasped)
+        self._joints = self._grip.joints
 
     @property
     def time(self) -> float:
@@ -135,7 +146,7 @@ class BulletWorld:
     @property
     def tip(self) -> Point:
         """Where the moving arm's jaws meet, in the world."""
-        return self._jaws[:3, 3].copy()
+        return self.settings.placement.arms[1].forward(self._joints[1])[:3, 3].copy()
 
     def nodes(self) -> Nodes:
         """Return the mesh nodes, in metres, (n, 3)."""
@@ -148,45 +159,47 @@ class BulletWorld:
             path: Joint positions, (n, 6); the first should be where the arm stands.
             times: When to be at each, in seconds from now, increasing from 0, (n,).
         """
-        count = int(np.ceil(times[-1] / self.settings.time_step))
-        instants = np.minimum(np.arange(1, count + 1) * self.settings.time_step, times[-1])
+        count = int(np.ceil(times[-1] / self._step_time))
+        instants = np.minimum(np.arange(1, count + 1) * self._step_time, times[-1])
         columns = [np.interp(instants, times, path[:, k]) for k in range(path.shape[1])]
-        arm = self.settings.placement.arms[1]
         for joints in np.column_stack(columns):
-            jaws = arm.forward(joints)
-            moved = jaws @ inverse(self._jaws)
-            where = self._body.nodes()[self._gripped] @ moved[:3, :3].T + moved[:3, 3]
-            self._body.place(self._gripped, where)
-            self._jaws = jaws
+            self._grip.lead(joints)
             self._step()
-        self._joints = (self._joints[0], path[-1].copy())
+        self._joints = self._grip.joints
 
     def settle(self) -> Settling:
-        """Let the object come to rest with the arms still.
+        """Let the arms and the object come to rest.
 
-        Blocks of steps, each from a standstill, until one moves no node farther than the
-        tolerance: what is left then is a few hundredths of a millimetre.
+        Blocks of steps, each from a standstill, until the arms stand still and a block moves no
+        node farther than the tolerance: what is left then is a few hundredths of a millimetre.
         """
         before = self._body.nodes()
         steps, settled = 0, False
         while not settled and steps < self.settings.patience:
             for _ in range(self.settings.block):
                 self._step()
-            after = self._body.nodes()
+            after, still = self._body.nodes(), self._grip.still
             self._body.stop()
-            self._time += self.settings.time_step
+            self._time += self._step_time
             steps += self.settings.block + 1
             moved = float(np.abs(after - before).max())
-            settled = moved < self.settings.tolerance
+            settled = still and moved < self.settings.tolerance
             before = after
+            self._joints = self._grip.joints
             if not np.isfinite(moved):
                 return Settling(settled=False, steps=steps, least_volume_ratio=float("nan"))
-        ratio = float(self.mesh.volume_ratios(before).min())
+        ratio = float(self._mesh.volume_ratios(before).min())
         return Settling(settled=settled, steps=steps, least_volume_ratio=ratio)
+
+    def deviation(self) -> float:
+        """Return how far the worst node is from where the grasp takes it straight from rest."""
+        nodes = self._body.nodes()
+        straight = self._reference.settle(self._rest, nodes[self._pinned])
+        return float(np.linalg.norm(nodes - straight.nodes, axis=1).max())
 
     def look(self) -> DepthImage:
         """Return what the depth camera sees, drawn by Bullet's software renderer."""
-        self._arms.show(self._joints)
+        self._grip.show()
         camera = self.settings.camera
         _, _, _, buffer, mask = pybullet.getCameraImage(
             camera.width,
@@ -209,14 +222,22 @@ class BulletWorld:
             depth.astype(np.float32), np.asarray(mask, dtype=np.int32).reshape(shape), camera
         )
 
+    def _new_grip(self) -> Grip:
+        place = self.settings.placement
+        arms = BulletArms(self._client, place)
+        arms.touch_nothing()
+        if self.settings.drive == "motor":
+            return MotorGrip(self._client, self._body, arms)
+        return KinematicGrip(self._body, arms, moving=place.arms[1])
+
     def _step(self) -> None:
         pybullet.stepSimulation(physicsClientId=self._client)
-        self._time += self.settings.time_step
+        self._time += self._step_time
 
 
-def _posed(nodes: Vertices, scene: Scene, height: float) -> Vertices:
+def _posed(nodes: Vertices, scene: Scene) -> Vertices:
     """Return the rest shape as it lies on the table."""
-    offset = np.array([*scene.position, height / 2])
+    offset = np.array([*scene.position, 0.0])
     return nodes @ rotation_z(scene.yaw).T + offset
 
 

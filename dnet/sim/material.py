@@ -1,5 +1,6 @@
 """Elastic constants: from what an engineer states to what Bullet wants."""
 
+import math
 from typing import NamedTuple
 
 
@@ -28,3 +29,15 @@ def stable_neo_hookean(young: float, poisson: float) -> Lame:
     """
     mu, lam = lame(young, poisson)
     return Lame(mu=4 / 3 * mu, lam=lam + 5 / 6 * mu)
+
+
+def wave_speed(young: float, poisson: float, density: float) -> float:
+    """Return the speed of pressure waves in m/s: the fastest that anything spreads in a solid.
+
+    Args:
+        young: Young's modulus in pascals.
+        poisson: Poisson's ratio.
+        density: In kg/m^3.
+    """
+    mu, lam = lame(young, poisson)
+    return math.sqrt((lam + 2 * mu) / density)

@@ -4,25 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dnet.errors import NoReachableSurface
 from dnet.geometry.pose import rotation_z
-from dnet.types import Point, Scene
+from dnet.sim.tissue import hold_point, tissue_mesh
+from dnet.types import Point, Scene, Tissue
 
-
-@dataclass(frozen=True)
-class SoftBox:
-    """The object of the paper: a soft box on the table."""
-
-    size: tuple[float, float, float] = (0.10, 0.10, 0.04)
-    """Length along x, y and z in metres."""
-    cells: tuple[int, int, int] = (8, 8, 4)
-    """Mesh cells along each axis; four through the thickness bend within 13 % of a beam's
-    stiffness, and 405 nodes stay fast."""
-    young: float = 1000.0
-    """Young's modulus in pascals."""
-    poisson: float = 0.3
-    """Poisson's ratio."""
-    density: float = 1000.0
-    """In kg/m^3."""
+HIDDEN = 1000
+"""Draws on the object's surface after which none of it can be reachable."""
 
 
 @dataclass(frozen=True)
@@ -33,31 +21,41 @@ class Workspace:
     """Largest offset of the object from the origin along x and along y, in metres."""
     yaw: float = 0.2
     """Largest turn of the object about the vertical, in radians."""
-    grasp_low: tuple[float, float] = (0.020, -0.040)
-    """Least manipulation point on the object's top face (x, y in its own frame), in metres."""
-    grasp_high: tuple[float, float] = (0.045, 0.040)
-    """Greatest manipulation point, likewise."""
-    displacement_low: tuple[float, float, float] = (-0.03, -0.05, 0.0)
-    """Least displacement of the gripper from the manipulation point, in metres: pushing inwards
-    by more than 3 cm, or down, turns tetrahedra inside out."""
-    displacement_high: tuple[float, float, float] = (0.05, 0.05, 0.05)
+    toward: tuple[float, float, float] = (0.447, 0.0, 0.894)
+    """Where the moving arm comes from, seen from the object, as a unit vector."""
+    facing: float = 0.3
+    """The surface is reachable where its normal has at least this component along `toward`."""
+    clearance: float = 0.05
+    """Least distance of a manipulation point from the held end of the object, along the object,
+    in metres: room for the holding arm."""
+    displacement_low: tuple[float, float, float] = (0.0, -0.06, 0.0)
+    """Least displacement of the gripper from the manipulation point, in metres. The ranges are
+    those of the DeformerNet authors' simulation: pulls along the object by up to 5 cm, 6 cm to
+    either side, up to 7 cm high."""
+    displacement_high: tuple[float, float, float] = (0.05, 0.06, 0.07)
     """Greatest displacement of the gripper, in metres."""
-    hold: float = 0.005
-    """How far from the object's end the holding arm grips its top face, in metres."""
 
 
-def draw_scene(workspace: Workspace, box: SoftBox, random: np.random.Generator) -> Scene:
-    """Return a random initial configuration and manipulation point on the object's top face."""
+def draw_scene(workspace: Workspace, tissue: Tissue, random: np.random.Generator) -> Scene:
+    """Return a random initial configuration and a random manipulation point on the surface.
+
+    The point is uniform over the part of the surface that the moving arm can reach.
+    """
     x, y = random.uniform(-workspace.position, workspace.position, size=2)
     yaw = random.uniform(-workspace.yaw, workspace.yaw)
-    grasp = random.uniform(workspace.grasp_low, workspace.grasp_high)
-    length, _, height = box.size
-    hold = np.array([-length / 2 + workspace.hold, 0.0])
+    turn = rotation_z(yaw)
+    toward = turn.T @ np.array(workspace.toward)
+    placed = [
+        turn @ point + np.array([x, y, 0.0])
+        for point in (hold_point(tissue), _draw_surface_point(workspace, tissue, toward, random))
+    ]
+    hold, manipulation_point = (tuple(point.tolist()) for point in placed)
     return Scene(
         position=(float(x), float(y)),
         yaw=float(yaw),
-        hold=_on_top(hold, (x, y), yaw, height),
-        manipulation_point=_on_top(grasp, (x, y), yaw, height),
+        hold=hold,
+        manipulation_point=manipulation_point,
+        tissue=tissue,
     )
 
 
@@ -66,8 +64,23 @@ def draw_displacement(workspace: Workspace, random: np.random.Generator) -> Poin
     return random.uniform(workspace.displacement_low, workspace.displacement_high)
 
 
-def _on_top(
-    point: np.ndarray, position: tuple[float, float], yaw: float, height: float
-) -> tuple[float, float, float]:
-    x, y = rotation_z(yaw)[:2, :2] @ point + position
-    return (float(x), float(y), height)
+def _draw_surface_point(
+    workspace: Workspace, tissue: Tissue, toward: Point, random: np.random.Generator
+) -> Point:
+    """Return a point of the reachable surface, in the object's own frame, (3,)."""
+    mesh = tissue_mesh(tissue)
+    corners = mesh.nodes[mesh.surface()]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1) / 2
+    faces = normals @ toward / (2 * areas) >= workspace.facing
+    least = mesh.nodes[:, 0].min() + workspace.clearance
+    faces &= corners[:, :, 0].max(axis=1) >= least
+    if faces.any():
+        corners, areas = corners[faces], areas[faces]
+        for _ in range(HIDDEN):
+            triangle = corners[random.choice(len(corners), p=areas / areas.sum())]
+            weights = random.dirichlet((1.0, 1.0, 1.0))
+            point: Point = weights @ triangle
+            if point[0] >= least:
+                return point
+    raise NoReachableSurface(tissue.size, workspace.clearance)

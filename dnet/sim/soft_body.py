@@ -1,4 +1,4 @@
-"""A soft body in Bullet: loading it, pinning nodes, moving what is pinned, bringing it to rest."""
+"""A soft body in Bullet: loading it, pinning or anchoring nodes, moving them, stopping them."""
 
 import tempfile
 from collections.abc import Sequence
@@ -22,8 +22,8 @@ NodeIndices = Int64[np.ndarray, "_"]
 class SoftBody:
     """An elastic body whose nodes can be pinned and carried along.
 
-    A pinned node is one whose mass Bullet sets to zero: it stays where it is put. Whatever grips
-    the body pins the nodes between its jaws.
+    A pinned node is one whose mass Bullet sets to zero: it stays where it is put. An anchored one
+    goes with a link of another body, and pulls at it.
     """
 
     def __init__(
@@ -57,6 +57,12 @@ class SoftBody:
                 NeoHookeanMu=mu,
                 NeoHookeanLambda=lam,
                 NeoHookeanDamping=DAMPING,
+                # Bullet reads the springs' stiffness even where there are none: if it is not
+                # set here, it is what an earlier command left at that place in memory.
+                useMassSpring=1,
+                springElasticStiffness=0,
+                springDampingStiffness=0,
+                springBendingStiffness=0,
                 collisionMargin=COLLISION_MARGIN,
                 useSelfCollision=0,
                 useFaceContact=0,
@@ -66,7 +72,7 @@ class SoftBody:
         self._wake()
         # Bullet leaks a copy of every new list it is handed: this one is changed in place.
         self._rows: list[list[float]] = mesh.nodes.tolist()
-        self._pins: dict[int, int] = {}
+        self._grips: list[int] = []
 
     def nodes(self) -> Vertices:
         """Return where the nodes are, in metres, (n, 3)."""
@@ -74,16 +80,23 @@ class SoftBody:
 
     def pin(self, nodes: NodeIndices) -> None:
         """Hold nodes where they are."""
+        # No body stands for a pin.
+        self.anchor(nodes, body=-1, link=-1)
+
+    def anchor(self, nodes: NodeIndices, *, body: int, link: int) -> None:
+        """Fix nodes, as they lie now, to a link of another body, which must have a solid shape."""
         for node in nodes:
-            self._pins[int(node)] = pybullet.createSoftBodyAnchor(
-                self.body, int(node), -1, -1, physicsClientId=self._client
+            self._grips.append(
+                pybullet.createSoftBodyAnchor(
+                    self.body, int(node), body, link, physicsClientId=self._client
+                )
             )
 
     def release(self) -> None:
-        """Let go of every pinned node, which gets its mass back."""
-        for anchor in self._pins.values():
-            pybullet.removeConstraint(anchor, physicsClientId=self._client)
-        self._pins.clear()
+        """Let go of every pinned or anchored node; a pinned one gets its mass back."""
+        for grip in self._grips:
+            pybullet.removeConstraint(grip, physicsClientId=self._client)
+        self._grips.clear()
 
     def place(self, nodes: Sequence[int] | NodeIndices, where: Float64[np.ndarray, "_ 3"]) -> None:
         """Put nodes at given positions and leave the others where they are."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 
 Vertices = Float64[np.ndarray, "_ 3"]
 
@@ -33,6 +33,15 @@ class TetrahedralMesh:
         """Return each tetrahedron's volume over its rest volume: J, negative where inverted."""
         return self.volumes(nodes) / self.volumes(self.nodes)
 
+    def least_altitude(self) -> float:
+        """Return the least distance of a node from the opposite face of its tetrahedron."""
+        # The rows of the inverse edge matrix are the gradients of the corners' weights: each is
+        # as long as the altitude of its corner is short.
+        gradients = np.linalg.inv(self.edges(self.nodes))
+        first = -gradients.sum(axis=1, keepdims=True)
+        lengths = np.linalg.norm(np.concatenate([first, gradients], axis=1), axis=2)
+        return float(1 / lengths.max())
+
     def surface(self) -> Int64[np.ndarray, "_ 3"]:
         """Return the triangles that bound the mesh, outward by the right-hand rule."""
         corners = self.tetrahedra
@@ -54,12 +63,34 @@ def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> T
     """
     axes = [np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size, cells, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    index = np.arange(len(nodes)).reshape([n + 1 for n in cells])
+    return split_cells(nodes, *grid_cells(cells))
+
+
+def grid_cells(
+    cells: tuple[int, int, int],
+) -> tuple[Int64[np.ndarray, "n 8"], Bool[np.ndarray, "n"]]:
+    """Return the eight corners of each cell of a grid, and which split each takes.
+
+    The grid has one node more than cells along each axis; nodes and cells count along z first.
+    """
+    index = np.arange(np.prod([n + 1 for n in cells])).reshape([n + 1 for n in cells])
     i, j, k = np.meshgrid(*(np.arange(n) for n in cells), indexing="ij")
     corners = np.stack(
         [index[i + a, j + b, k + c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], axis=-1
     ).reshape(-1, 8)
-    even = ((i + j + k) % 2 == 0).ravel()
+    return corners, ((i + j + k) % 2 == 0).ravel()
+
+
+def split_cells(
+    nodes: Vertices, corners: Int64[np.ndarray, "n 8"], even: Bool[np.ndarray, "n"]
+) -> TetrahedralMesh:
+    """Return a mesh of hexahedral cells, each split into five positively oriented tetrahedra.
+
+    Args:
+        nodes: In metres.
+        corners: The eight nodes of each cell.
+        even: Whether a cell takes the even split; cells that share a face must differ.
+    """
     split = np.where(even[:, None, None], np.array(EVEN_SPLIT), np.array(ODD_SPLIT))
     tetrahedra = np.take_along_axis(corners[:, None, :], split, axis=2).reshape(-1, 4)
     inverted = TetrahedralMesh(nodes, tetrahedra).volumes(nodes) < 0

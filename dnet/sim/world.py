@@ -71,6 +71,13 @@ class World(Protocol):
         """Let the object come to rest with the arms still."""
         ...
 
+    def deviation(self) -> float:
+        """Return how far the settled shape is from where the grasp takes it straight from rest.
+
+        The worst node's distance in metres: large where the grasp allows several shapes.
+        """
+        ...
+
     def look(self) -> DepthImage:
         """Return what the depth camera sees."""
         ...

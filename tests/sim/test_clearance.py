@@ -11,7 +11,8 @@ from dnet.geometry.camera import Camera
 from dnet.planning.planner import ArmPlanner
 from dnet.sim.arms import Placement
 from dnet.sim.clearance import Clearance
-from dnet.sim.scenes import SoftBox, Workspace, draw_displacement, draw_scene
+from dnet.sim.scenes import Workspace, draw_displacement, draw_scene
+from dnet.types import Tissue
 
 PLACE = Placement()
 
@@ -59,18 +60,27 @@ def test_the_camera_is_in_the_way_where_it_hangs() -> None:
     assert "camera" in blocked
 
 
-def test_every_random_motion_of_the_workspace_is_reachable_and_clear(
+def test_every_random_motion_from_a_clear_grasp_is_reachable_and_clear(
     clearance: Clearance,
 ) -> None:
     planner = ArmPlanner(PLACE.arms[1], clearance)
     random = np.random.default_rng(3)
-    workspace, box = Workspace(), SoftBox()
-    for _ in range(40):
-        scene = draw_scene(workspace, box, random)
+    workspace = Workspace()
+    blocked = 0
+    for _ in range(60):
+        scene = draw_scene(workspace, Tissue(), random)
         start = PLACE.joints_at(1, np.array(scene.manipulation_point))
         holding = PLACE.joints_at(0, np.array(scene.hold))
-        plan = planner.plan((holding, start), draw_displacement(workspace, random), seed=0)
+        displacement = draw_displacement(workspace, random)
+        clearance.stand(holding)
+        if clearance.obstacle(start):
+            # Low on the end face the jaws meet the table: such a scene is drawn again.
+            assert scene.manipulation_point[2] < 0.02
+            blocked += 1
+            continue
+        plan = planner.plan((holding, start), displacement, seed=0)
         assert plan.status == "straight", plan.reason
+    assert blocked < 20
 
 
 def test_the_arm_cannot_reach_the_other_side_of_the_table() -> None:

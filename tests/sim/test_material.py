@@ -9,6 +9,7 @@ from dnet.sim.arms import Placement
 from dnet.sim.bullet_world import BulletWorld
 from dnet.sim.material import lame, stable_neo_hookean
 from dnet.sim.tetrahedra import box_mesh
+from dnet.sim.tissue import tissue_mesh
 from dnet.types import Scene
 from tests.sim.oracle import Oracle
 
@@ -65,11 +66,11 @@ def test_settled_shapes_agree_with_an_independent_solver(
         world.follow(np.array([before, after]), np.array([0.0, 0.5]))
         assert world.settle().settled
         settled = world.nodes().astype(np.float64)
-        mesh = world.mesh
+        mesh = tissue_mesh(SCENE.tissue)
         moved = np.linalg.norm(rest - np.array(SCENE.manipulation_point), axis=1)
         gripped = np.flatnonzero(moved < world.settings.jaw_radius)
         held = np.flatnonzero(mesh.nodes[:, 0] == mesh.nodes[:, 0].min())
-        mu, lam = stable_neo_hookean(world.settings.box.young, world.settings.box.poisson)
+        mu, lam = stable_neo_hookean(SCENE.tissue.young, SCENE.tissue.poisson)
 
     pinned = np.concatenate([held, gripped])
     targets = np.concatenate([rest[held], rest[gripped] + np.array(displacement)])

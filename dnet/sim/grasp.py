@@ -1,0 +1,56 @@
+"""The start of an episode: where a scene puts the object and the arms, and what they grip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int64
+
+from dnet.errors import EmptyGrasp
+from dnet.geometry.pose import rotation_z
+from dnet.sim.arms import Placement
+from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
+from dnet.sim.tissue import held_nodes, tissue_mesh
+from dnet.types import Joints, Scene
+
+JAW_RADIUS = 0.016
+"""Nodes this near to the tip are between the jaws, in metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """An object at rest with both arms on it."""
+
+    joints: tuple[Joints, Joints]
+    """Of the holding and the moving arm."""
+    mesh: TetrahedralMesh
+    """The object in its own frame."""
+    rest: Vertices
+    """Its nodes as it lies on the table, in metres, (n, 3)."""
+    held: Int64[np.ndarray, "_"]
+    """The nodes that the holding arm grips."""
+    gripped: Int64[np.ndarray, "_"]
+    """The nodes that the moving arm grips."""
+
+    @property
+    def pinned(self) -> Int64[np.ndarray, "_"]:
+        """All nodes that an arm grips, those of the holding arm first."""
+        return np.concatenate([self.held, self.gripped])
+
+
+def grasp(scene: Scene, placement: Placement, *, jaw_radius: float = JAW_RADIUS) -> Grasp:
+    """Return the object at rest, held and grasped as the scene says.
+
+    Raises:
+        Unreachable: If an arm cannot reach its point.
+        EmptyGrasp: If no node is within the jaws' radius of the manipulation point.
+    """
+    point = np.array(scene.manipulation_point)
+    joints = (placement.joints_at(0, np.array(scene.hold)), placement.joints_at(1, point))
+    mesh = tissue_mesh(scene.tissue)
+    rest = mesh.nodes @ rotation_z(scene.yaw).T + np.array([*scene.position, 0.0])
+    distance = np.linalg.norm(rest - point, axis=1)
+    near = np.flatnonzero(distance < jaw_radius)
+    if not len(near):
+        raise EmptyGrasp(scene.manipulation_point, float(distance.min()), jaw_radius)
+    held = held_nodes(mesh.nodes)
+    return Grasp(joints, mesh, rest, held, np.setdiff1d(near, held))
