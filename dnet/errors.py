@@ -1,10 +1,21 @@
 """Everything that dnet refuses, under one root: what it was, its value, the limit, the way out."""
 
 from pathlib import Path
+from typing import Any
 
 
 class DnetError(Exception):
     """The root: the command prints these in one line and exits with 1."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # From process to process an error goes by its message: `__init__` takes something else.
+        return _again, (type(self), self.args)
+
+
+def _again(kind: type[DnetError], args: tuple[Any, ...]) -> DnetError:
+    error = kind.__new__(kind)
+    error.args = args
+    return error
 
 
 class ShortCloud(DnetError, ValueError):
@@ -57,7 +68,7 @@ class NoEpisodes(DnetError, FileNotFoundError):
 class OccupiedOutput(DnetError, FileExistsError):
     """An output directory that already holds a run."""
 
-    def __init__(self, path: Path, holds: str) -> None:
+    def __init__(self, path: Path | str, holds: str) -> None:
         super().__init__(
             f"output {path} already holds {holds}; choose another directory or remove it first"
         )
@@ -228,7 +239,7 @@ class NoReachableSurface(DnetError, ValueError):
 class OtherRequest(DnetError, ValueError):
     """A directory in which another recording began."""
 
-    def __init__(self, folder: Path, differences: list[str]) -> None:
+    def __init__(self, folder: Path | str, differences: list[str]) -> None:
         shown = ", ".join(differences[:4]) + (", ..." if len(differences) > 4 else "")
         super().__init__(
             f"{folder} holds a recording with other settings ({shown}); repeat the call that "
@@ -239,7 +250,7 @@ class OtherRequest(DnetError, ValueError):
 class BadManifest(DnetError, ValueError):
     """A manifest that does not say what was recorded."""
 
-    def __init__(self, path: Path, why: str) -> None:
+    def __init__(self, path: Path | str, why: str) -> None:
         super().__init__(
             f"{path} is no manifest of a recording: {why}; the episodes beside it are readable "
             "by themselves, record into another directory"
@@ -249,7 +260,7 @@ class BadManifest(DnetError, ValueError):
 class DamagedEpisode(DnetError, ValueError):
     """An episode that is not as long as it was when it was finished."""
 
-    def __init__(self, path: Path, got: int, want: int) -> None:
+    def __init__(self, path: Path | str, got: int, want: int) -> None:
         super().__init__(
             f"{path} has {got} bytes, had {want} when it was finished; remove it, and the same "
             "call records it again"
@@ -259,7 +270,7 @@ class DamagedEpisode(DnetError, ValueError):
 class WorkerDied(DnetError, RuntimeError):
     """A process that was to record and is no more."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path | str) -> None:
         super().__init__(
             f"a worker that recorded into {folder} was killed, perhaps for want of memory; "
             "finished episodes are kept, the same call goes on; fewer --workers take less memory"
@@ -269,7 +280,7 @@ class WorkerDied(DnetError, RuntimeError):
 class NoSpace(DnetError, OSError):
     """A disk without room for what is to be written."""
 
-    def __init__(self, folder: Path, need: int, free: int) -> None:
+    def __init__(self, folder: Path | str, need: int, free: int) -> None:
         super().__init__(
             f"{folder} has {free / 1e9:.2f} GB free, the recording takes about "
             f"{need / 1e9:.2f} GB; make room, choose another disk, or ask for fewer --pairs, "
@@ -313,4 +324,63 @@ class BrokenLimit(DnetError, RuntimeError):
         super().__init__(
             f"{len(broken)} of the material's limits broken: {'; '.join(broken)}; "
             "don't record with this simulation before you know why"
+        )
+
+
+class MissingExtra(DnetError, ImportError):
+    """A package that only some need, and that is not installed."""
+
+    def __init__(self, package: str, extra: str, what: str) -> None:
+        super().__init__(
+            f"{what} needs {package}, which is not installed; pip install deformernet[{extra}]"
+        )
+
+
+class UnknownStore(DnetError, ValueError):
+    """A URL of which nobody knows how to write to it."""
+
+    def __init__(self, url: str, why: str) -> None:
+        super().__init__(
+            f"{url} is no store that can be written to: {why}; "
+            "give a folder, or a URL such as s3://bucket/data"
+        )
+
+
+class StoreFailed(DnetError, OSError):
+    """A folder or object store that does not do what is asked of it."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(
+            f"{name} fails: {why}; see that it is there and that you may write to it; "
+            "finished episodes are kept, the same call goes on"
+        )
+
+
+class OtherWorker(DnetError, RuntimeError):
+    """A process that would not record what was asked for, or not where."""
+
+    def __init__(self, host: str, name: str, why: str) -> None:
+        super().__init__(
+            f"a worker on {host} cannot record into {name}: {why}; all of them must see the same "
+            "files there, and have the same versions of dnet and of what it builds on"
+        )
+
+
+class NoCluster(DnetError, ConnectionError):
+    """A Ray cluster that is not there, or does not answer."""
+
+    def __init__(self, address: str, why: str) -> None:
+        super().__init__(
+            f"no Ray cluster at {address}: {why}; `ray start --head` begins one, "
+            "`--ray local` makes one for this recording alone"
+        )
+
+
+class ClusterFailed(DnetError, RuntimeError):
+    """A Ray cluster that does not do what is asked of it."""
+
+    def __init__(self, address: str, why: str) -> None:
+        super().__init__(
+            f"the Ray cluster at {address} failed: {why}; every node needs the same dnet installed; "
+            "finished episodes are kept, the same call goes on"
         )
