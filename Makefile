@@ -27,7 +27,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo test check format lint type layers build clean
+.PHONY: help setup develop libraries demo test check format lint type layers benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -80,6 +80,9 @@ type:
 
 layers:
 	$(BIN)/lint-imports
+
+benchmark: develop ## Measure how fast the laboratory is, as ratios
+	$(BIN)/python -m tests.benchmarks.laboratory --workers
 
 build: develop ## Build the wheel and the sdist into dist/
 	$(BIN)/python -m build

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from dnet.types import TissueShape
-
 if TYPE_CHECKING:
     from dnet.recording.manifest import Manifest
     from dnet.recording.request import RecordingRequest
@@ -39,7 +37,9 @@ class Record:
     """Of everything drawn at random."""
     workers: int = 1
     """Processes to record on; as many as there are cores is fastest."""
-    tissue: Annotated[TissueShape, tyro.conf.arg(name="object")] = "box"
+    tissue: Annotated[
+        Literal["box", "cylinder", "hemi_ellipsoid"], tyro.conf.arg(name="object")
+    ] = "box"
     """Shape of the object; a cylinder lies, a hemi_ellipsoid has its flat side down."""
     young: float = 1000.0
     """Young's modulus of the object in pascals (paper: 1000; the follow-ups 5000 and 10000)."""
