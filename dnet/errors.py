@@ -381,6 +381,6 @@ class ClusterFailed(DnetError, RuntimeError):
 
     def __init__(self, address: str, why: str) -> None:
         super().__init__(
-            f"the Ray cluster at {address} failed: {why}; every node needs the same dnet installed; "
+            f"the Ray cluster at {address} failed: {why}; every node needs the same dnet; "
             "finished episodes are kept, the same call goes on"
         )

@@ -11,6 +11,7 @@ ER_TINY_RENDERER: int
 GEOM_BOX: int
 GEOM_CYLINDER: int
 MESH_DATA_SIMULATION_MESH: int
+POSITION_CONTROL: int
 RESET_USE_DEFORMABLE_WORLD: int
 
 def connect(method: int) -> int: ...
@@ -38,6 +39,10 @@ def loadSoftBody(
     NeoHookeanMu: float = 1.0,
     NeoHookeanLambda: float = 1.0,
     NeoHookeanDamping: float = 0.1,
+    useMassSpring: int = 0,
+    springElasticStiffness: float = 1.0,
+    springDampingStiffness: float = 0.1,
+    springBendingStiffness: float = 0.1,
     collisionMargin: float = 0.02,
     useSelfCollision: int = 0,
     useFaceContact: int = 0,
@@ -54,7 +59,13 @@ def createSoftBodyAnchor(
 ) -> int: ...
 def removeConstraint(userConstraintUniqueId: int, physicsClientId: int = 0) -> None: ...
 def changeDynamics(
-    bodyUniqueId: int, linkIndex: int, *, activationState: int, physicsClientId: int = 0
+    bodyUniqueId: int,
+    linkIndex: int,
+    *,
+    mass: float = ...,
+    activationState: int = ...,
+    localInertiaDiagonal: Sequence[float] = ...,
+    physicsClientId: int = 0,
 ) -> None: ...
 def getMeshData(
     bodyUniqueId: int, linkIndex: int = -1, *, flags: int = 0, physicsClientId: int = 0
@@ -95,6 +106,22 @@ def getJointInfo(
 def resetJointState(
     bodyUniqueId: int, jointIndex: int, targetValue: float, *, physicsClientId: int = 0
 ) -> None: ...
+def setJointMotorControl2(
+    bodyUniqueId: int,
+    jointIndex: int,
+    controlMode: int,
+    *,
+    targetPosition: float = 0.0,
+    targetVelocity: float = 0.0,
+    force: float = 0.0,
+    positionGain: float = 0.1,
+    velocityGain: float = 1.0,
+    maxVelocity: float = ...,
+    physicsClientId: int = 0,
+) -> None: ...
+def getJointStates(
+    bodyUniqueId: int, jointIndices: Sequence[int], physicsClientId: int = 0
+) -> Sequence[tuple[float, float, Sequence[float], float]]: ...
 def getLinkState(
     bodyUniqueId: int,
     linkIndex: int,

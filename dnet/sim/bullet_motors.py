@@ -9,11 +9,13 @@ from dnet.types import Joints
 
 GRIPPING_LINK = "wrist_yaw_link"
 """The link that both jaws hang on: what they grip goes with it."""
-WRIST_INERTIA = 0.01
-"""Of the gripping link about each axis, in kg m^2. Bullet's motors and anchors see each other's
-impulses only from one step to the next: in between, a pull f at a distance r from the wrist turns
-it by f r dt^2 / inertia. The link's own 1e-7 kg m^2 would give way to the softest tissue; a real
-wrist has the inertia of its rotors behind it, times the square of the gear ratio."""
+GRIPPING_MASS = 2.0
+"""Of the gripping link, in kg. Bullet's motors and anchors see each other's impulses only from one
+step to the next; in between, a pull f moves a link of mass m by f dt^2 / m. The wrist's own 12 g
+would give way to the softest tissue. What a real arm has against that are the rotors of its
+motors, whose inertia counts with the square of the gear ratio."""
+GRIPPING_INERTIA = 0.01
+"""Of the gripping link about each axis, in kg m^2: the same for its turning."""
 
 
 class ArmMotors:
@@ -43,7 +45,8 @@ class ArmMotors:
         pybullet.changeDynamics(
             self._body,
             self.gripping_link,
-            localInertiaDiagonal=[WRIST_INERTIA] * 3,
+            mass=GRIPPING_MASS,
+            localInertiaDiagonal=[GRIPPING_INERTIA] * 3,
             physicsClientId=client,
         )
 

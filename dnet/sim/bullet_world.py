@@ -3,24 +3,23 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 
-from dnet.errors import EmptyGrasp
 from dnet.geometry.camera import Camera, DepthImage
-from dnet.geometry.pose import inverse, rotation_z
 from dnet.sim.arms import HOME, Placement
 from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
+from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.bullet_grip import Drive, Grip
 from dnet.sim.furniture import TABLE
+from dnet.sim.grasp import JAW_RADIUS, grasp
 from dnet.sim.kinematic_grip import KinematicGrip
 from dnet.sim.material import wave_speed
 from dnet.sim.motor_grip import MotorGrip
 from dnet.sim.quasistatic import QuasistaticSolver
 from dnet.sim.soft_body import SoftBody
-from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
-from dnet.sim.tissue import held_nodes, tissue_mesh
+from dnet.sim.tissue import tissue_mesh
 from dnet.sim.world import Settling
 from dnet.types import JointPath, Joints, Nodes, Point, Scene, Tissue
 
@@ -35,22 +34,27 @@ class BulletSettings:
     """How the arms hold and grasp. `kinematic`: they are exactly where the path says, and what they
     grip with them. `motor`: position motors drive them along the path within limits of force and
     velocity, and what they grip is anchored to their wrists; slower, to the same shapes."""
-    jaw_radius: float = 0.016
+    jaw_radius: float = JAW_RADIUS
     """Nodes this near to the tip are between the jaws, in metres."""
     courant: float = 1.5
     """Time step as a multiple of the least altitude of a tetrahedron over the speed of sound in
     the object; the body becomes unstable above 2.3."""
     block: int = 15
-    """Steps between two looks at whether the body has come to rest."""
+    """Steps of the usual box between two looks at whether it has come to rest; an object with a
+    finer mesh takes as many more as its steps are shorter."""
     tolerance: float = 1e-4
     """The body rests when no node moves farther than this in a block, in metres."""
     patience: int = 2000
-    """Steps after which settling is given up."""
+    """Steps after which settling is given up, likewise."""
 
     def time_step(self, tissue: Tissue) -> float:
         """Return the seconds that a simulation step of an object may take."""
         altitude = float(tissue_mesh(tissue).least_altitude())
         return self.courant * altitude / wave_speed(tissue.young, tissue.poisson, tissue.density)
+
+    def refinement(self, tissue: Tissue) -> float:
+        """Return how many steps of an object last as long as one of the usual box would."""
+        return tissue_mesh(Tissue()).least_altitude() / tissue_mesh(tissue).least_altitude()
 
 
 class BulletWorld:
@@ -82,43 +86,33 @@ class BulletWorld:
             Unreachable: If an arm cannot reach its point.
             EmptyGrasp: If no node is within the jaws' radius of the manipulation point.
         """
-        place = self.settings.placement
-        hold = place.joints_at(0, np.array(scene.hold))
-        grasp = place.joints_at(1, np.array(scene.manipulation_point))
-        mesh = tissue_mesh(scene.tissue)
-        nodes = _posed(mesh.nodes, scene)
-        gripped = _near(nodes, np.array(scene.manipulation_point), self.settings.jaw_radius)
-        if not len(gripped):
-            distance = float(np.linalg.norm(nodes - scene.manipulation_point, axis=1).min())
-            raise EmptyGrasp(scene.manipulation_point, distance, self.settings.jaw_radius)
+        start = grasp(scene, self.settings.placement, jaw_radius=self.settings.jaw_radius)
+        self._rest, self._mesh = start.rest, start.mesh
+        self._held, self._gripped, self._pinned = start.held, start.gripped, start.pinned
 
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
         pybullet.setGravity(0, 0, 0, physicsClientId=client)
         self._step_time = self.settings.time_step(scene.tissue)
+        self._refinement = self.settings.refinement(scene.tissue)
         pybullet.setTimeStep(self._step_time, physicsClientId=client)
         # Bullet's grid for contact between soft bodies: none is in use, so coarse is cheap.
         pybullet.setPhysicsEngineParameter(sparseSdfVoxelSize=0.25, physicsClientId=client)
         self._body = SoftBody(
             client,
-            mesh,
+            self._mesh,
             young=scene.tissue.young,
             poisson=scene.tissue.poisson,
             density=scene.tissue.density,
         )
         self.object_id = self._body.body
-        self._rest = nodes
-        self._mesh = mesh
-        self._held = held_nodes(mesh.nodes)
-        self._gripped = np.setdiff1d(gripped, self._held)
-        self._pinned = np.concatenate([self._held, self._gripped])
         self._reference = QuasistaticSolver(
-            mesh, young=scene.tissue.young, poisson=scene.tissue.poisson
+            self._mesh, young=scene.tissue.young, poisson=scene.tissue.poisson
         )
         self._reference.hold(self._pinned)
         self._grip = self._new_grip()
         add_picture(TABLE, client)
-        self._grasped = (hold, grasp)
+        self._grasped = start.joints
         self._time = 0.0
         self.restore()
 
@@ -175,13 +169,14 @@ class BulletWorld:
         """
         before = self._body.nodes()
         steps, settled = 0, False
-        while not settled and steps < self.settings.patience:
-            for _ in range(self.settings.block):
+        block = round(self.settings.block * self._refinement)
+        while not settled and steps < self.settings.patience * self._refinement:
+            for _ in range(block):
                 self._step()
             after, still = self._body.nodes(), self._grip.still
             self._body.stop()
             self._time += self._step_time
-            steps += self.settings.block + 1
+            steps += block + 1
             moved = float(np.abs(after - before).max())
             settled = still and moved < self.settings.tolerance
             before = after
@@ -200,27 +195,7 @@ class BulletWorld:
     def look(self) -> DepthImage:
         """Return what the depth camera sees, drawn by Bullet's software renderer."""
         self._grip.show()
-        camera = self.settings.camera
-        _, _, _, buffer, mask = pybullet.getCameraImage(
-            camera.width,
-            camera.height,
-            viewMatrix=_view_matrix(camera),
-            projectionMatrix=pybullet.computeProjectionMatrixFOV(
-                fov=float(np.degrees(camera.field_of_view)),
-                aspect=camera.width / camera.height,
-                nearVal=camera.near,
-                farVal=camera.far,
-            ),
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
-        shape = (camera.height, camera.width)
-        stored = np.asarray(buffer, dtype=np.float64).reshape(shape)
-        near, far = camera.near, camera.far
-        depth = far * near / (far - (far - near) * stored)
-        return DepthImage(
-            depth.astype(np.float32), np.asarray(mask, dtype=np.int32).reshape(shape), camera
-        )
+        return depth_image(self.settings.camera, self._client)
 
     def _new_grip(self) -> Grip:
         place = self.settings.placement
@@ -233,20 +208,3 @@ class BulletWorld:
     def _step(self) -> None:
         pybullet.stepSimulation(physicsClientId=self._client)
         self._time += self._step_time
-
-
-def _posed(nodes: Vertices, scene: Scene) -> Vertices:
-    """Return the rest shape as it lies on the table."""
-    offset = np.array([*scene.position, 0.0])
-    return nodes @ rotation_z(scene.yaw).T + offset
-
-
-def _near(nodes: Vertices, point: Point, radius: float) -> Int64[np.ndarray, "_"]:
-    return np.flatnonzero(np.linalg.norm(nodes - point, axis=1) < radius)
-
-
-def _view_matrix(camera: Camera) -> list[float]:
-    """Return OpenGL's view matrix, column by column: it looks along -z with y up."""
-    optical_to_gl = np.diag([1.0, -1.0, -1.0, 1.0])
-    matrix: list[float] = (optical_to_gl @ inverse(camera.pose)).T.ravel().tolist()
-    return matrix

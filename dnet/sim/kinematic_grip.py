@@ -14,7 +14,7 @@ class KinematicGrip:
     still = True
 
     def __init__(self, body: SoftBody, arms: BulletArms, *, moving: Psm) -> None:
-        """Say what is gripped, by which bodies, and how the moving arm's tool follows its joints."""
+        """Say what is gripped, by which bodies, and how the moving arm is built."""
         self._body, self._arms, self._moving = body, arms, moving
         self.joints = (HOME, HOME)
 

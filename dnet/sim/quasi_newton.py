@@ -19,6 +19,8 @@ ARMIJO = 1e-4
 """Share of the promised decrease that a step must bring."""
 ROUNDING = 1e-13
 """Changes of the energy, relative to it, that mean nothing."""
+FLAT = 1e-10
+"""Cosine between a step and its change of the gradient below which it is not remembered."""
 SHORTENINGS = 20
 """Tries of the line search."""
 MEMORY = 8
@@ -151,12 +153,16 @@ def remember(memory: Memory) -> None:
     """Keep the step at the cursor in the place of the oldest."""
     size = memory.steps.shape[0]
     k = memory.cursor[1]
-    curvature = inner(memory.changes[k], memory.steps[k])
-    # Where the energy is concave along the step, it says nothing of a minimum.
-    if curvature > 0:
+    step, change = memory.steps[k], memory.changes[k]
+    curvature = inner(change, step)
+    if curvature > FLAT * np.sqrt(inner(step, step) * inner(change, change)):
         memory.inverse[k] = 1 / curvature
         memory.cursor[0] = min(memory.cursor[0] + 1, size)
         memory.cursor[1] = (k + 1) % size
+    else:
+        # Where the energy is not convex along a step, it says nothing of a minimum. What was
+        # in its place is lost.
+        memory.cursor[0] = min(memory.cursor[0], size - 1)
 
 
 @compiled

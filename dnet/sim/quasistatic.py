@@ -134,6 +134,7 @@ def _increments(start: Components, way: Float64[np.ndarray, "_ _ 3"]) -> Iterato
     """Yield places along the way, no node farther than an increment from one to the next."""
     ends = way.transpose(0, 2, 1)
     for number, end in enumerate(ends, start=1):
+        # A place is left out if the one after it can be reached at once.
         if number < len(ends) and _farthest(ends[number] - start) <= INCREMENT:
             continue
         count = max(1, int(np.ceil(_farthest(end - start) / INCREMENT)))

@@ -3,12 +3,14 @@
 A grid of cells that is bent as a whole into a round shape has cells at its edges whose two outer
 faces lie in one plane, and in them tetrahedra as flat. So these cells are left out, and the gaps
 that they leave are closed. Every cell is then close to a cube, which keeps the time step long,
-and the mesh is symmetric and the same on every machine. Delaunay meshes of such bodies have
-slivers; TetWild (Hu et al. 2020) has none, but makes another mesh on every run.
+and the mesh is symmetric and the same on every machine.
+
+Free meshers do not serve here: Delaunay meshes of points in such a body have slivers, and fTetWild
+(Hu et al. 2020) makes another mesh on every run (its issue 72).
 """
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool
 
 from dnet.errors import TooFew
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices, grid_cells, split_cells
@@ -53,37 +55,36 @@ def hemi_ellipsoid_mesh(
 def _wrapped(
     size: tuple[float, float, float], cells: tuple[int, int, int], *, low: Sides, high: Sides
 ) -> TetrahedralMesh:
-    """Return a round body, from a grid whose outermost layers are 1 at the sides that are round.
+    """Return a body that is round on some sides, each covered by a layer of cells.
 
     Args:
-        size: In metres.
-        cells: Number of cells along each axis.
-        low: Which sides of least x, y and z are round: 1 or 0.
-        high: Which sides of greatest x, y and z are round. An axis that is round on this side
-            only has its middle on the other.
+        size: Along x, y and z, in metres.
+        cells: Number of cells along x, y and z, with the layers.
+        low: Number of layers, 0 or 1, on the sides of least x, y and z.
+        high: The same for the other sides. An axis with a layer on this side only has the
+            middle of the body on the other.
     """
     for axis, count, least in zip("xyz", cells, np.add(low, high) + 1, strict=True):
         if count < least:
             raise TooFew(f"the number of mesh cells along {axis}", count, int(least))
     shape = [count + 1 for count in cells]
     first, last = np.array(low), np.array(cells) - high
-    grid = np.stack(np.indices(shape), axis=-1).reshape(-1, 3)
-    # A node of the layer stands on one of the core: where two sides meet, on the same one.
+    grid = np.indices(shape).reshape(3, -1).T
+    # A node of a layer stands on one of the core: where two layers meet, on the same one.
     foot = np.clip(grid, first, last)
-    name = 2 * np.ravel_multi_index(tuple(foot.T), shape) + (foot != grid).any(axis=1)
+    outside = foot != grid
+    name = 2 * np.ravel_multi_index(tuple(foot.T), shape) + outside.any(axis=1)
     corners, even = grid_cells(cells)
-    sides = (foot != grid)[corners].any(axis=1).sum(axis=1)
-    used, numbers = np.unique(name[corners[sides < 2]], return_inverse=True)
+    kept = outside[corners].any(axis=1).sum(axis=1) < 2
+    used, corners = np.unique(name[corners[kept]], return_inverse=True)
     foot = np.stack(np.unravel_index(used // 2, shape), axis=-1)
-    middle = np.where(np.equal(low, high), (first + last) / 2, first)
-    nodes = np.array(size) * _shaped(
-        (foot - middle) / (last - middle),
-        used % 2 == 1,
-        round_axes=np.array(high, dtype=bool),
-    )
-    nodes = nodes * np.where(np.equal(low, high), 0.5, 1.0)
+    centred = np.equal(low, high)
+    middle = np.where(centred, (first + last) / 2, first)
+    places = (foot - middle) / (last - middle)
+    nodes = _shaped(places, used % 2 == 1, round_axes=np.array(high) == 1)
+    nodes = nodes * size * np.where(centred, 0.5, 1.0)
     nodes[:, 2] -= nodes[:, 2].min()
-    return split_cells(nodes, numbers.reshape(-1, 8), even[sides < 2])
+    return split_cells(nodes, corners.reshape(-1, 8), even[kept])
 
 
 def _shaped(
@@ -92,14 +93,14 @@ def _shaped(
     """Return where nodes are in a body of radius 1.
 
     Args:
-        foot: Each node's place in the core, or that of the node it stands on, from -1 to 1.
-        outside: Whether it stands on the core, and so belongs to the surface.
-        round_axes: The axes about which the body is round.
+        foot: Where a node is in the core, or the node that it stands on, from -1 to 1.
+        outside: Whether it stands on the core: it is on the surface then.
+        round_axes: The axes along which the body is round.
     """
     flat = np.where(round_axes, foot, 0.0)
     reach = np.abs(flat).max(axis=1, keepdims=True)
-    # Close to tan(pi / 4 x), which parts the surface into equal angles, but without a function
-    # whose last digit differs between processors.
+    # Close to tan(pi / 4 x), which divides the surface by equal angles, but without a function
+    # whose last digit differs from one processor to another.
     angular = flat * (np.pi / 4 + (1 - np.pi / 4) * flat**2)
     length = np.sqrt((angular**2).sum(axis=1, keepdims=True))
     surface = angular / np.where(length > 0, length, 1.0)

@@ -80,23 +80,21 @@ def hang(
 
 def _settle(body: SoftBody, client: int) -> tuple[Vertices, int]:
     rest = before = body.nodes()
-    fastest, steps = 0.0, 0
-    while steps < PATIENCE:
+    fastest, farthest, steps = 0.0, np.inf, 0
+    while steps < PATIENCE and not np.isnan(farthest):
         for _ in range(BLOCK):
             pybullet.stepSimulation(physicsClientId=client)
         steps += BLOCK
         nodes = body.nodes()
-        moved = np.abs(nodes - before)
-        speed = float((moved**2).sum())
+        speed = float(((nodes - before) ** 2).sum())
+        farthest = float(np.abs(nodes - before).max())
         before = nodes
         if speed > fastest:
             fastest = speed
-        elif moved.max() <= TOLERANCE * np.abs(nodes - rest).max():
+        elif farthest <= TOLERANCE * np.abs(nodes - rest).max():
             return nodes, steps
-        elif np.isfinite(speed):
+        else:
             body.stop()
             before = body.nodes()
             fastest, steps = 0.0, steps + 1
-        else:
-            break
-    raise Unsettled("a body under its own weight", steps, float(moved.max()))
+    raise Unsettled("a body under its own weight", steps, farthest)

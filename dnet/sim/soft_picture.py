@@ -30,6 +30,10 @@ class SoftPicture:
             )
             self.body: int = pybullet.loadSoftBody(
                 str(path),
+                useMassSpring=1,
+                springElasticStiffness=0,
+                springDampingStiffness=0,
+                springBendingStiffness=0,
                 collisionMargin=1e-4,
                 useSelfCollision=0,
                 useFaceContact=0,

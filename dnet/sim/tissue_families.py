@@ -37,8 +37,10 @@ MOST_NODES = 500
 class Sizes(Protocol):
     """Sizes of one shape: the usual one, and others at random."""
 
-    usual: Size
-    """Along x, y and z, in metres."""
+    @property
+    def usual(self) -> Size:
+        """Length along x, y and z, in metres."""
+        ...
 
     def draw(self, random: np.random.Generator) -> Size:
         """Return a random size, in metres."""

@@ -11,6 +11,7 @@ import pytest
 from dnet.errors import EmptyGrasp, Unreachable
 from dnet.geometry.camera import unproject
 from dnet.sim.bullet_world import BulletSettings, BulletWorld
+from dnet.sim.tissue import tissue_mesh
 from dnet.types import Scene
 
 SCENE = Scene((0.006, -0.004), 0.15, (-0.04, 0.0, 0.04), (0.04, 0.0, 0.04))
@@ -51,7 +52,8 @@ def test_what_the_jaws_hold_goes_with_them_and_the_held_end_stays(world: BulletW
     np.testing.assert_allclose(
         moved[jaws], np.tile([0.03, 0.01, 0.02], (int(jaws.sum()), 1)), atol=2e-6
     )
-    end = world.mesh.nodes[:, 0] == world.mesh.nodes[:, 0].min()
+    rest = tissue_mesh(SCENE.tissue).nodes
+    end = rest[:, 0] == rest[:, 0].min()
     np.testing.assert_allclose(moved[end], 0, atol=1e-7)
     assert np.linalg.norm(moved[~jaws & ~end], axis=1).max() > 0.01
 
@@ -98,7 +100,7 @@ def test_points_lie_on_the_surface_that_rays_meet(world: BulletWorld) -> None:
     surface = open3d.t.geometry.RaycastingScene()
     surface.add_triangles(
         open3d.core.Tensor.from_numpy(world.nodes()),
-        open3d.core.Tensor.from_numpy(world.mesh.surface().astype(np.uint32)),
+        open3d.core.Tensor.from_numpy(tissue_mesh(SCENE.tissue).surface().astype(np.uint32)),
     )
     distance = surface.compute_distance(open3d.core.Tensor.from_numpy(cloud)).numpy()
     assert len(cloud) > 4096

@@ -1,6 +1,26 @@
-"""Kernels compile wherever they come from."""
+"""Kernels compile wherever they come from, and again when what they call has changed."""
+
+import subprocess
+import sys
+from pathlib import Path
 
 from dnet.sim.compiled import compiled
+
+CALLED = """
+from dnet.sim.compiled import compiled
+
+@compiled
+def step(x):
+    return x + {step}
+"""
+CALLING = """
+from called import step
+from dnet.sim.compiled import compiled
+
+@compiled
+def climb(x):
+    return step(step(x))
+"""
 
 
 def test_a_kernel_without_a_place_for_its_cache_is_compiled_all_the_same() -> None:
@@ -12,3 +32,21 @@ def test_a_kernel_without_a_place_for_its_cache_is_compiled_all_the_same() -> No
     kernel = compiled(twice)
     assert kernel(21) == 42
     assert kernel(float("inf")) == float("inf")
+
+
+def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:
+    def climbed() -> str:
+        code = "from calling import climb; print(climb(0))"
+        command = [sys.executable, "-c", code]
+        return subprocess.run(
+            command, cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout.strip()
+
+    (tmp_path / "calling.py").write_text(CALLING)
+    (tmp_path / "called.py").write_text(CALLED.format(step=1))
+    assert climbed() == "2"
+    kept = set(tmp_path.glob("__pycache__/calling.climb*.nbi"))
+    assert len(kept) == 1, "the machine code is kept"
+    assert climbed() == "2"
+    (tmp_path / "called.py").write_text(CALLED.format(step=10))
+    assert climbed() == "20"

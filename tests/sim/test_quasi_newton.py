@@ -6,7 +6,14 @@ from scipy.sparse import csr_array
 from dnet.sim.elastic_energy import elements, energy_and_gradient
 from dnet.sim.envelope import factorised
 from dnet.sim.material import Lame
-from dnet.sim.quasi_newton import Descent, Limits, empty_memory, minimise
+from dnet.sim.quasi_newton import (
+    MEMORY,
+    Descent,
+    Limits,
+    empty_memory,
+    minimise,
+    remember,
+)
 from dnet.sim.tetrahedra import box_mesh
 
 MESH = box_mesh((0.04, 0.02, 0.02), (4, 2, 2))
@@ -17,9 +24,9 @@ IDENTITY = factorised(csr_array(30.0 * np.eye(FREE)))
 """A poor guess of the Hessian, in N/m: what is learned on the way must make up for it."""
 
 
-def shaken() -> np.ndarray:
+def shaken(scale: float = 2e-3) -> np.ndarray:
     points = np.ascontiguousarray(MESH.nodes.T)
-    points[:, :FREE] += np.random.default_rng(0).normal(scale=2e-3, size=(3, FREE))
+    points[:, :FREE] += np.random.default_rng(0).normal(scale=scale, size=(3, FREE))
     return points
 
 
@@ -33,6 +40,36 @@ def test_a_shaken_body_finds_back_to_rest() -> None:
     assert found.converged
     assert found.residual < 1e-7
     np.testing.assert_allclose(points.T, MESH.nodes, atol=1e-5)
+
+
+def test_a_crumpled_body_comes_to_rest_as_well() -> None:
+    """Where the energy is not convex, and half of the tetrahedra are inside out."""
+    points = shaken(0.03)
+    assert (MESH.volume_ratios(points.T) < 0).mean() > 0.3
+    found = descend(points, patience=3000)
+    assert found.converged
+    gradient = np.empty_like(points)
+    energy_and_gradient(points, BODY, gradient)
+    assert np.abs(gradient[:, :FREE]).max() < 1e-4
+
+
+def test_steps_without_curvature_are_forgotten() -> None:
+    """The ring keeps the latest steps; one that the gradient does not rise along is no use."""
+    memory = empty_memory(2)
+    random = np.random.default_rng(0)
+    for count in range(1, MEMORY + 3):
+        memory.steps[memory.cursor[1]] = random.normal(size=(3, 2))
+        memory.changes[memory.cursor[1]] = 2 * memory.steps[memory.cursor[1]]
+        remember(memory)
+        assert memory.cursor[0] == min(count, MEMORY)
+    following = memory.cursor[1]
+    memory.steps[following] = 1.0
+    memory.changes[following] = -1.0
+    remember(memory)
+    assert memory.cursor.tolist() == [MEMORY - 1, following]
+    products = (memory.steps * memory.changes).sum(axis=(1, 2))
+    kept = np.arange(MEMORY) != following
+    np.testing.assert_allclose(memory.inverse[kept] * products[kept], 1.0)
 
 
 def test_more_patience_means_less_energy() -> None:
