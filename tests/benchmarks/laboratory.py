@@ -21,6 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dnet.laboratory import LaboratorySettings, laboratory
+from dnet.recording.folder_store import FolderStore
 from dnet.recording.pair import record_pair
 from dnet.recording.request import RecordingRequest
 from tests.benchmarks.stages import Stages, record
@@ -97,7 +98,7 @@ class Benchmark:
         resident = []
         with laboratory(settings) as lab:
             for index in range(request.pairs):
-                record_pair(lab, request, index, folder, shape_done=lambda: None)
+                record_pair(lab, request, index, FolderStore(folder), shape_done=lambda: None)
                 resident.append(process.memory_info().rss)
                 console.print(f"{200 * (index + 1)} shapes: {resident[-1] / 1e6:.1f} MB")
         console.print(f"after 2000 shapes against after 200: {resident[-1] / resident[0]:.3f}")

@@ -1,6 +1,6 @@
 """Where the time of a recording goes: a laboratory whose every part is timed."""
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -24,7 +24,7 @@ class Stages:
     """Processor seconds by stage."""
 
     def __init__(self) -> None:
-        self.seconds: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -74,9 +74,9 @@ def record(settings: LaboratorySettings, folder: Path, *, pairs: int, shapes: in
                 stages.seconds.clear()
             begin = process_time()
             rollout = Rollout(
-                world,  # type: ignore[arg-type]
-                planner,  # type: ignore[arg-type]
-                partial(observe, world, see),  # type: ignore[arg-type]
+                world,
+                planner,
+                partial(observe, world, see),
                 workspace=settings.workspace,
                 draw_tissue=lambda random: Tissue(),
                 seed=(0, index),
