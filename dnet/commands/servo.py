@@ -50,8 +50,8 @@ class Servo:
         """
         from rich.console import Console
 
-        from dnet.laboratory import LaboratorySettings, laboratory
         from dnet.commands.servo_log import RECORDING, ServoLog
+        from dnet.laboratory import LaboratorySettings, laboratory
         from dnet.servo.loop import ServoSettings, servo
         from dnet.sim.observe import observe
         from dnet.training.checkpoints import load
@@ -116,7 +116,8 @@ class Servo:
         from dnet.types import EpisodeMeta
 
         name = f"servo-{goal.source.replace('.mcap:', '-')}"
-        settings = lab.settings.describe() | {"goal": goal.source, "checkpoint": self.checkpoint.name}
+        run = {"goal": goal.source, "checkpoint": self.checkpoint.name}
+        settings = lab.settings.describe() | run
         return EpisodeMeta(name, self.seed, 0, scene, settings)
 
 

@@ -12,12 +12,12 @@ from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.bullet_grip import Drive, Grip
+from dnet.sim.foresight import Foresight
 from dnet.sim.furniture import TABLE
 from dnet.sim.grasp import JAW_RADIUS, grasp
 from dnet.sim.kinematic_grip import KinematicGrip
 from dnet.sim.material import wave_speed
 from dnet.sim.motor_grip import MotorGrip
-from dnet.sim.quasistatic import QuasistaticSolver
 from dnet.sim.soft_body import SoftBody
 from dnet.sim.tissue import tissue_mesh
 from dnet.sim.world import Settling
@@ -44,7 +44,7 @@ class BulletSettings:
     finer mesh takes as many more as its steps are shorter."""
     tolerance: float = 1e-4
     """The body rests when no node moves farther than this in a block, in metres."""
-    patience: int = 2000
+    patience: int = 600
     """Steps after which settling is given up, likewise."""
 
     def time_step(self, tissue: Tissue) -> float:
@@ -88,7 +88,8 @@ class BulletWorld:
         """
         start = grasp(scene, self.settings.placement, jaw_radius=self.settings.jaw_radius)
         self._rest, self._mesh = start.rest, start.mesh
-        self._held, self._gripped, self._pinned = start.held, start.gripped, start.pinned
+        self._held, self._gripped = start.held, start.gripped
+        self._foresight = Foresight(start, scene.tissue)
 
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
@@ -106,10 +107,6 @@ class BulletWorld:
             density=scene.tissue.density,
         )
         self.object_id = self._body.body
-        self._reference = QuasistaticSolver(
-            self._mesh, young=scene.tissue.young, poisson=scene.tissue.poisson
-        )
-        self._reference.hold(self._pinned)
         self._grip = self._new_grip()
         add_picture(TABLE, client)
         self._grasped = start.joints
@@ -186,11 +183,13 @@ class BulletWorld:
         ratio = float(self._mesh.volume_ratios(before).min())
         return Settling(settled=settled, steps=steps, least_volume_ratio=ratio)
 
+    def foresee(self, displacement: Point) -> float:
+        """Return the least volume ratio that a displacement from rest leads to."""
+        return self._foresight.least_volume_ratio(displacement)
+
     def deviation(self) -> float:
         """Return how far the worst node is from where the grasp takes it straight from rest."""
-        nodes = self._body.nodes()
-        straight = self._reference.settle(self._rest, nodes[self._pinned])
-        return float(np.linalg.norm(nodes - straight.nodes, axis=1).max())
+        return self._foresight.deviation(self._body.nodes())
 
     def look(self) -> DepthImage:
         """Return what the depth camera sees, drawn by Bullet's software renderer."""

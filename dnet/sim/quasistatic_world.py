@@ -10,9 +10,9 @@ from dnet.sim.bullet import pybullet
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
+from dnet.sim.foresight import Foresight
 from dnet.sim.furniture import TABLE
 from dnet.sim.grasp import JAW_RADIUS, grasp
-from dnet.sim.quasistatic import QuasistaticSolver
 from dnet.sim.soft_picture import SoftPicture
 from dnet.sim.tetrahedra import Vertices
 from dnet.sim.world import Settling
@@ -65,10 +65,8 @@ class QuasistaticWorld:
             EmptyGrasp: If no node is within the jaws' radius of the manipulation point.
         """
         self._grasp = grasp(scene, self._placement, jaw_radius=self._jaw_radius)
-        self._solver = QuasistaticSolver(
-            self._grasp.mesh, young=scene.tissue.young, poisson=scene.tissue.poisson
-        )
-        self._solver.hold(self._grasp.pinned)
+        self._foresight = Foresight(self._grasp, scene.tissue)
+        self._solver = self._foresight.solver
 
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
@@ -128,11 +126,13 @@ class QuasistaticWorld:
         ratio = float(self._grasp.mesh.volume_ratios(self._found.nodes).min())
         return Settling(settled=self._found.converged, steps=steps, least_volume_ratio=ratio)
 
+    def foresee(self, displacement: Point) -> float:
+        """Return the least volume ratio that a displacement from rest leads to."""
+        return self._foresight.least_volume_ratio(displacement)
+
     def deviation(self) -> float:
         """Return how far the worst node is from where the grasp takes it straight from rest."""
-        nodes = self._found.nodes
-        straight = self._solver.settle(self._grasp.rest, nodes[self._grasp.pinned])
-        return float(np.linalg.norm(nodes - straight.nodes, axis=1).max())
+        return self._foresight.deviation(self._found.nodes)
 
     def look(self) -> DepthImage:
         """Return what the depth camera sees, drawn by Bullet's software renderer."""

@@ -40,8 +40,9 @@ class Rollout:
     """One episode: a random scene, its rest shape, and random settled shapes.
 
     A shape is drawn again, from the rest shape, and counted in `rejected` if it is `unreachable`,
-    `unsettled` (does not come to rest), `inverted` (a tetrahedron is turned inside out), or
-    `bistable` (the grasp allows another shape, which it would have reached straight from rest).
+    `unsettled` (does not come to rest), `inverted` (a tetrahedron is turned inside out, as it is
+    foreseen or as it comes to be), or `bistable` (the grasp allows another shape, which it would
+    have reached straight from rest).
     A scene that cannot be grasped is counted as `scene`.
     """
 
@@ -95,17 +96,28 @@ class Rollout:
     def _shape(self) -> list[Frame]:
         for _ in range(PATIENCE):
             displacement = draw_displacement(self._workspace, self._random)
-            plan = self._plan(np.array(self.scene.manipulation_point) + displacement)
-            if plan.status in ("partial", "failed"):
-                reason: str | None = "unreachable"
-            else:
-                way = self._follow(plan)
-                reason = self._fault()
-                if reason is None:
-                    return [*way, self._observe("shape")]
-            self.rejected[reason or ""] += 1
-            self._world.restore()
+            seen, fault = self._try(displacement)
+            if fault is None:
+                return seen
+            self.rejected[fault] += 1
         raise NoValidShape("shape", PATIENCE, dict(self.rejected))
+
+    def _try(self, displacement: Point) -> tuple[list[Frame], str | None]:
+        """Return what is seen of a displacement from rest, and what is wrong with it, if anything.
+
+        What can be known beforehand is: a body that is turned inside out takes long to settle.
+        """
+        if self._world.foresee(displacement) < LEAST_VOLUME_RATIO:
+            return [], "inverted"
+        plan = self._plan(np.array(self.scene.manipulation_point) + displacement)
+        if plan.status in ("partial", "failed"):
+            return [], "unreachable"
+        seen = self._follow(plan)
+        fault = self._fault()
+        if fault is not None:
+            self._world.restore()
+            return [], fault
+        return [*seen, self._observe("shape")], None
 
     def _plan(self, target: Point) -> Plan:
         self._plans += 1

@@ -71,6 +71,10 @@ class World(Protocol):
         """Let the object come to rest with the arms still."""
         ...
 
+    def foresee(self, displacement: Point) -> float:
+        """Return the least volume ratio of the shape that a displacement from rest leads to."""
+        ...
+
     def deviation(self) -> float:
         """Return how far the settled shape is from where the grasp takes it straight from rest.
 

@@ -67,10 +67,15 @@ class Moody:
     """A world in which every other shape is turned inside out, and a planner that obeys."""
 
     def __init__(
-        self, ratios: list[float], *, settled: bool = True, deviation: float = 0.0
+        self,
+        ratios: list[float],
+        *,
+        settled: bool = True,
+        deviation: float = 0.0,
+        foreseen: float = -1.0,
     ) -> None:
         self.ratios, self.settled, self.calls = ratios, settled, 0
-        self.deviated = deviation
+        self.deviated, self.foreseen = deviation, foreseen
         self.paths: list[tuple[JointPath, np.ndarray]] = []
         self.tip_now = np.zeros(3)
         self.restored = 0
@@ -102,6 +107,9 @@ class Moody:
         self.calls += 1
         return Settling(self.settled or self.calls == 1, 20, self.ratios[self.calls % 2])
 
+    def foresee(self, displacement: Point) -> float:
+        return -0.1 if displacement[0] < self.foreseen else 0.9
+
     def deviation(self) -> float:
         return self.deviated
 
@@ -122,6 +130,17 @@ def test_inverted_shapes_are_counted_and_drawn_again_from_rest() -> None:
     assert len(frames) == 4
     assert rollout.rejected == {"inverted": 3}
     assert world.restored == 3
+
+
+def test_shapes_that_are_foreseen_to_invert_are_counted_and_never_tried() -> None:
+    world = Moody([0.9, 0.9], foreseen=0.02)
+    rollout = rollout_in(world, world)
+    frames = list(rollout.frames(20))
+    assert rollout.rejected["inverted"] > 3
+    assert len(world.paths) == 20
+    assert world.restored == 0
+    start = frames[0].grasp[0]
+    assert all(frame.grasp[0] - start >= 0.02 for frame in frames[1:])
 
 
 def test_a_world_that_never_settles_is_given_up_with_the_count() -> None:
