@@ -10,7 +10,9 @@ from dnet.sim.tetrahedra import TetrahedralMesh, Vertices, box_mesh
 from dnet.types import Point, Tissue
 
 HELD_SHARE = 0.1
-"""The holding arm grips this share of the object's length, in its own frame from least x."""
+"""Of an object without a flat end, the holding arm grips this share of the length."""
+LEAST_FACE = 4
+"""Nodes that make an end flat."""
 
 
 @lru_cache(maxsize=64)
@@ -25,10 +27,15 @@ def tissue_mesh(tissue: Tissue) -> TetrahedralMesh:
 
 
 def held_nodes(nodes: Vertices) -> Int64[np.ndarray, "_"]:
-    """Return which nodes of a mesh at rest, in its own frame, the holding arm grips."""
-    x = nodes[:, 0]
+    """Return which nodes of a mesh at rest, in its own frame, the holding arm grips.
+
+    They are those of the end at least x: its face, which every mesh of a box has alike, or the
+    outermost tenth of a body that has no face there.
+    """
+    along = (nodes[:, 0] - nodes[:, 0].min()) / np.ptp(nodes[:, 0])
     # A trifle more, so that rounding does not decide about nodes just at the limit.
-    return np.flatnonzero(x <= x.min() + (HELD_SHARE + 1e-9) * (x.max() - x.min()))
+    face = np.flatnonzero(along <= 1e-9)
+    return face if len(face) >= LEAST_FACE else np.flatnonzero(along <= HELD_SHARE + 1e-9)
 
 
 def hold_point(tissue: Tissue) -> Point:
