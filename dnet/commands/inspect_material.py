@@ -33,7 +33,8 @@ class Material:
         from rich.console import Console
 
         from dnet.commands.progress import progress
-        from dnet.tools.material import check_table, checks, mesh_table, refuse_broken, validate
+        from dnet.tools.material import validate
+        from dnet.tools.material_checks import check_table, checks, mesh_table, refuse_broken
         from dnet.tools.material_document import write_tables
         from dnet.tools.material_plot import draw_material
         from dnet.tools.tables import print_table
