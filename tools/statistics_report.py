@@ -139,6 +139,13 @@ def _print_speed(speed: Speed, finished: int, console: Console) -> None:
         for name, pace in paces.items()
     ]
     print_table(pl.DataFrame(rows))
+    for worker in speed.workers:
+        if worker.episodes > 1 and worker.first_bytes and worker.last_bytes:
+            console.print(
+                f"memory of worker {worker.worker}: {worker.first_bytes / 1e6:.1f} MB after its "
+                f"first episode, {worker.last_bytes / 1e6:.1f} MB after {worker.shapes} shapes "
+                f"({worker.last_bytes / worker.first_bytes - 1:+.1%})"
+            )
     if speed.unreadable_lines:
         console.print(f"{speed.unreadable_lines} cut-off lines of {TIMINGS} do not count")
 

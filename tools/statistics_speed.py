@@ -28,6 +28,10 @@ class Worker:
     shapes: int
     pace: Pace
     """By the clock on the wall, while it worked."""
+    first_bytes: int | None
+    """Resident memory after its first episode, None where nothing says it."""
+    last_bytes: int | None
+    """And after its last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +59,8 @@ class _Timing(NamedTuple):
     cpu_seconds: float
     ended: float
     """Seconds since 1970."""
+    memory: int | None
+    """Resident bytes of the worker."""
 
 
 def read_speed(directory: Path) -> Speed | None:
@@ -84,7 +90,8 @@ def read_speed(directory: Path) -> Speed | None:
 def _worker(number: int, timings: list[_Timing]) -> Worker:
     shapes = sum(timing.shapes for timing in timings)
     pace = _pace(shapes, sum(timing.seconds for timing in timings))
-    return Worker(number, len(timings), shapes, pace)
+    first, last = timings[0].memory, timings[-1].memory
+    return Worker(number, len(timings), shapes, pace, first_bytes=first, last_bytes=last)
 
 
 def _pace(shapes: int, seconds: float) -> Pace:
@@ -110,10 +117,11 @@ def _read(line: str) -> _Timing | None:
             float(record["seconds"]),
             float(record["cpu_seconds"]),
             datetime.fromisoformat(record["ended"]).timestamp(),
+            int(record["memory"]) if "memory" in record else None,
         )
     except (ValueError, TypeError, KeyError, OverflowError, OSError, RecursionError):
         return None
     # JSON knows NaN and Infinity where Python writes it.
-    if not all(map(math.isfinite, timing)) or min(timing[1:4]) < 0:
+    if not all(map(math.isfinite, timing[:5])) or min(timing[1:4]) < 0:
         return None
     return timing

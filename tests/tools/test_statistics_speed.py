@@ -6,9 +6,18 @@ import pytest
 from dnet.tools.statistics_speed import TIMINGS, read_speed
 
 
-def line(ended: str, *, worker: int = 0, shapes: int = 60, seconds: float = 30.0) -> str:
+def line(
+    ended: str,
+    *,
+    worker: int = 0,
+    shapes: int = 60,
+    seconds: float = 30.0,
+    memory: int | None = None,
+) -> str:
+    noted = {} if memory is None else {"memory": memory}
     return json.dumps(
-        {
+        noted
+        | {
             "episode": "episode-0-00000",
             "shapes": shapes,
             "seconds": seconds,
@@ -89,3 +98,15 @@ def test_no_time_at_all_gives_no_speed(tmp_path: Path) -> None:
     speed = read_speed(note(tmp_path, line("10:00:00", seconds=0.0)))
     assert speed is not None
     assert speed.machine.shapes_per_second is None
+
+
+def test_memory_is_told_of_the_first_and_the_last_episode_of_each_worker(tmp_path: Path) -> None:
+    lines = [
+        line("10:00:30", memory=100),
+        line("10:01:00", memory=300),
+        line("10:01:30", memory=110),
+    ]
+    speed = read_speed(note(tmp_path, *lines, line("10:01:30", worker=1)))
+    assert speed is not None
+    noted = [(worker.first_bytes, worker.last_bytes) for worker in speed.workers]
+    assert noted == [(100, 110), (None, None)]
