@@ -17,7 +17,7 @@ from dnet.types import Cloud, EpisodeMeta, Frame, Tissue
 
 PHYSICS = ("reset", "restore", "follow", "settle")
 SENSING = ("look",)
-CHECKING = ("deviation",)
+CHECKING = ("foresee", "deviation")
 
 
 class Stages:
