@@ -71,7 +71,7 @@ def minimise(
     stiffness: Envelope,
     memory: Memory,
     limits: Limits,
-) -> Descent:
+) -> tuple[bool, int, float]:
     """Move the free nodes to the nearest minimum of the energy.
 
     Args:
@@ -80,6 +80,10 @@ def minimise(
         stiffness: The first guess of the Hessian for each coordinate, factorised.
         memory: Carried on from one call to the next.
         limits: When to stop.
+
+    Returns:
+        The fields of a `Descent`, bare: where Ctrl-C comes while a kernel runs, numba crashes in
+        making a named tuple of them.
     """
     free = stiffness.first.shape[0]
     gradient = np.empty_like(points)
@@ -93,9 +97,9 @@ def minimise(
         residual = farthest(step)
         # Written so that NaN does not pass for convergence.
         if not residual >= limits.tolerance:
-            return Descent(residual < limits.tolerance, iterations, residual)
+            return residual < limits.tolerance, iterations, residual
         if iterations >= limits.patience:
-            return Descent(False, iterations, residual)
+            return False, iterations, residual
 
         slope = inner(gradient, step)
         share = 1.0
@@ -112,7 +116,7 @@ def minimise(
             share = min(max(least, 0.1 * share), 0.5 * share)
         if not accepted:
             if memory.cursor[0] == 0:
-                return Descent(False, iterations, residual)
+                return False, iterations, residual
             memory.cursor[0] = 0  # The remembered curvature misleads: begin anew.
             continue
 

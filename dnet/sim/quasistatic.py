@@ -112,7 +112,7 @@ class QuasistaticSolver:
             points[:, :free] += change + self._pulled_along(moved - last_moved)
             points[:, free:] = place
             limits = Limits(TOLERANCE if place is places[-1] else ON_THE_WAY, PATIENCE)
-            descents.append(minimise(points, self._body, self._factor, memory, limits))
+            descents.append(Descent(*minimise(points, self._body, self._factor, memory, limits)))
             change = points[:, :free] - before[:, :free]
         settled = np.empty_like(nodes)
         settled[self._order] = points.T

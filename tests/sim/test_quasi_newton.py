@@ -31,7 +31,8 @@ def shaken(scale: float = 2e-3) -> np.ndarray:
 
 
 def descend(points: np.ndarray, *, patience: int) -> Descent:
-    return minimise(points, BODY, IDENTITY, empty_memory(FREE), Limits(1e-7, patience))
+    limits = Limits(1e-7, patience)
+    return Descent(*minimise(points, BODY, IDENTITY, empty_memory(FREE), limits))
 
 
 def test_a_shaken_body_finds_back_to_rest() -> None:

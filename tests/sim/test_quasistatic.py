@@ -1,5 +1,7 @@
 """Shapes at rest are those of the energy, of an independent solver, and of Bullet."""
 
+import subprocess
+import sys
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -200,3 +202,36 @@ def test_a_body_all_of_whose_nodes_are_pinned_goes_where_they_go() -> None:
 def test_a_body_adrift_is_refused() -> None:
     with pytest.raises(TooFew, match="pinned nodes is 0"):
         solver(np.zeros(0, dtype=np.int64))
+
+
+INTERRUPTED = """
+import signal
+import numpy as np
+from dnet.sim.quasistatic import QuasistaticSolver
+from dnet.sim.tetrahedra import box_mesh
+
+mesh = box_mesh((0.1, 0.1, 0.04), (8, 8, 4))
+end, other = (np.flatnonzero(mesh.nodes[:, 0] == side) for side in (-0.05, 0.05))
+solver = QuasistaticSolver(mesh, young=1000.0, poisson=0.3)
+solver.hold(np.concatenate([end, other]))
+targets = np.concatenate([mesh.nodes[end], mesh.nodes[other] + [0.03, 0.02, 0.02]])
+solver.settle(mesh.nodes, targets)
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+interrupted = 0
+while interrupted < 200:
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.001 + interrupted % 10 * 1e-4)
+        while True:
+            solver.settle(mesh.nodes, targets)
+    except KeyboardInterrupt:
+        interrupted += 1
+print("survived")
+"""
+
+
+def test_ctrl_c_interrupts_a_kernel_without_a_crash() -> None:
+    ran = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert "survived" in ran.stdout
