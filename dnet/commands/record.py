@@ -27,8 +27,9 @@ class Record:
     Example: dnet record data/small --pairs 4 --shapes 20 --workers 2
     """
 
-    out: tyro.conf.Positional[Path]
-    """Directory for the episodes; made if need be."""
+    out: Annotated[tyro.conf.Positional[str | Path], tyro.conf.arg(metavar="DIRECTORY|URL")]
+    """Directory for the episodes, made if need be, or a URL that fsspec can write to, such as
+    s3://bucket/data (pip install deformernet[s3])."""
     pairs: int = 4
     """Pairs of initial configuration and manipulation point; one episode each (paper: 150)."""
     shapes: int = 20
@@ -37,6 +38,10 @@ class Record:
     """Of everything drawn at random."""
     workers: int = 1
     """Processes to record on; as many as there are cores is fastest."""
+    ray: Annotated[str | None, tyro.conf.arg(metavar="HOST:PORT|auto|local")] = None
+    """Record on all processors of a Ray cluster instead (pip install deformernet[ray]): that at
+    HOST:PORT, that of this machine (auto), or one for this recording alone (local). Its nodes need
+    the same dnet, and OUT must be a URL or a directory that all of them share."""
     tissue: Annotated[
         Literal["box", "cylinder", "hemi_ellipsoid"], tyro.conf.arg(name="object")
     ] = "box"
@@ -71,11 +76,12 @@ class Record:
 
         from dnet.commands.progress import progress
         from dnet.recording.dataset import record_missing, recording
+        from dnet.recording.store import open_store
 
         self._check()
         request = self._request()
         with (
-            recording(self.out, request) as manifest,
+            recording(open_store(self.out, shared=self.ray is not None), request) as manifest,
             progress(Console(stderr=True), "shapes") as bars,
         ):
             begun = len(manifest.missing())
@@ -83,6 +89,7 @@ class Record:
             record_missing(
                 manifest,
                 workers=self.workers,
+                ray=self.ray,
                 progress=lambda count: bars.update(task, advance=float(count)),
             )
             seconds = bars.tasks[0].finished_time or bars.tasks[0].elapsed or 1.0

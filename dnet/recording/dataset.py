@@ -1,68 +1,65 @@
-"""A whole dataset in a directory: begun, gone on with, and safe from a second writer."""
+"""A whole dataset in one place: begun, gone on with, and safe from a second writer."""
 
-import shutil
-from collections.abc import Callable, Iterator
+import errno
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
 
-from filelock import FileLock, Timeout
-
-from dnet.errors import NoSpace, OccupiedOutput, OutputInUse
 from dnet.recording.manifest import Manifest, open_manifest
-from dnet.recording.processes import record_here, record_in_processes
+from dnet.recording.processes import Progress, record_here, record_in_processes
+from dnet.recording.ray_cluster import record_on_ray
 from dnet.recording.request import RecordingRequest
-
-LOCK = ".recording.lock"
+from dnet.recording.store import Store
 
 
 @contextmanager
-def recording(folder: Path, request: RecordingRequest) -> Iterator[Manifest]:
-    """Open `folder` for a recording, alone; say what is still missing of it.
+def recording(store: Store, request: RecordingRequest) -> Iterator[Manifest]:
+    """Open a store for a recording, alone; say what is still missing of it.
 
     Raises:
         OutputInUse: If another process records there.
-        NoSpace: If what is missing does not fit on the disk.
-        OccupiedOutput, OtherRequest, BadManifest, DamagedEpisode: As `open_manifest`.
+        NoSpace: If what is missing does not fit.
+        StoreFailed: If it cannot be written to.
+        OccupiedOutput, OtherRequest, BadManifest, DamagedEpisode, BadEpisode: As `open_manifest`.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OccupiedOutput(folder, "a file")
-    folder.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(folder / LOCK, blocking=False)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise OutputInUse(folder) from error
-    try:
-        manifest = open_manifest(folder, request)
-        _check_space(folder, request, len(manifest.missing()))
+    with store.alone():
+        manifest = open_manifest(store, request)
+        _check_room(manifest)
+        manifest.write()
         yield manifest
-    finally:
-        lock.release()
 
 
-def record_missing(manifest: Manifest, *, workers: int, progress: Callable[[int], None]) -> int:
+def record_missing(
+    manifest: Manifest, *, workers: int = 1, ray: str | None = None, progress: Progress
+) -> int:
     """Record the pairs that a manifest lacks; return how many.
 
     Args:
         manifest: Of an open recording.
         workers: Processes; 1 stays in this one.
+        ray: Address of a Ray cluster that records instead.
         progress: Told how many shapes were done since the last time.
     """
-    request, indices = manifest.request, manifest.missing()
+    request, store, indices = manifest.request, manifest.store, manifest.missing()
     workers = min(workers, len(indices))
-    reports = (
-        record_here(request, indices, manifest.folder, progress)
-        if workers <= 1
-        else record_in_processes(request, indices, manifest.folder, progress, workers=workers)
-    )
-    with closing(reports):
-        for report in reports:
-            manifest.add(report)
+    if not indices:
+        return 0
+    if ray is not None:
+        reports = record_on_ray(request, indices, store, progress, address=ray)
+    elif workers == 1:
+        reports = record_here(request, indices, store, progress)
+    else:
+        reports = record_in_processes(request, indices, store, progress, workers=workers)
+    try:
+        with closing(reports):
+            for report in reports:
+                manifest.add(report)
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            _check_room(manifest)
+        raise
     return len(indices)
 
 
-def _check_space(folder: Path, request: RecordingRequest, missing: int) -> None:
-    need = missing * request.episode_bytes()
-    free = shutil.disk_usage(folder).free
-    if need > free:
-        raise NoSpace(folder, need, free)
+def _check_room(manifest: Manifest) -> None:
+    missing = len(manifest.missing())
+    manifest.store.check_room(missing, episode_bytes=manifest.request.episode_bytes())

@@ -51,7 +51,7 @@ class FolderStore:
             raise StoreFailed(self.name, str(error)) from error
         try:
             for left in self.folder.glob(f"{APART}*/"):
-                shutil.rmtree(left)
+                shutil.rmtree(left, ignore_errors=True)
             yield
         finally:
             lock.release()
@@ -67,7 +67,9 @@ class FolderStore:
             raise NoSpace(self.folder, need, free)
 
     def sizes(self) -> dict[str, int]:
-        """Return the bytes of each file, by name."""
+        """Return the bytes of each file, by name; none where there is no folder."""
+        if not self.folder.exists():
+            return {}
         with os.scandir(self.folder) as found:
             return {entry.name: entry.stat().st_size for entry in found if entry.is_file()}
 
@@ -97,7 +99,7 @@ class FolderStore:
             file.write(f"{line}\n")
 
     @contextmanager
-    def scratch(self, episode_bytes: int) -> Iterator[Path]:
+    def scratch(self, episode_bytes: int) -> Iterator[Path]:  # noqa: ARG002  # checked at the start
         """Return where to record an episode: the folder itself, or one hidden in it."""
         if self.in_place:
             yield self.folder

@@ -1,22 +1,20 @@
 """The manifest of a dataset: what was asked for and what is there, so that a second call goes on.
 
 `manifest.json` is the same for the same request, however often the recording was stopped, and on
-however many processes it ran. How long it took is another matter: a line of `timings.jsonl` for
-each episode.
+however many processes or machines it ran. How long it took is another matter: a line of
+`timings.jsonl` for each episode. Both belong to the process that leads the recording.
 """
 
 import json
-import os
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadManifest, DamagedEpisode, OccupiedOutput, OtherRequest
 from dnet.recording.pair import PairReport, manifest_entry
-from dnet.recording.request import RecordingRequest
+from dnet.recording.request import RecordingRequest, differences
+from dnet.recording.store import Store
 
 MANIFEST, TIMINGS = "manifest.json", "timings.jsonl"
 VERSION = 1
@@ -24,9 +22,9 @@ VERSION = 1
 
 @dataclass
 class Manifest:
-    """What a recording directory holds, by episode."""
+    """What a store holds of a recording, by episode."""
 
-    folder: Path
+    store: Store
     request: RecordingRequest
     pairs: int
     """Pairs asked for so far: a later call may ask for more."""
@@ -45,12 +43,12 @@ class Manifest:
             "shapes": self.request.shapes,
             "seconds": round(report.seconds, 3),
             "cpu_seconds": round(report.cpu_seconds, 3),
+            "host": report.host,
             "worker": report.worker,
             "memory": report.memory,
             "ended": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        with (self.folder / TIMINGS).open("a") as timings:
-            timings.write(json.dumps(line) + "\n")
+        self.store.append(TIMINGS, json.dumps(line))
         self.write()
 
     def rejected(self) -> Counter[str]:
@@ -61,7 +59,7 @@ class Manifest:
         return total
 
     def write(self) -> None:
-        """Write `manifest.json` beside itself and give it its name."""
+        """Write `manifest.json`."""
         content = {
             "version": VERSION,
             "pairs": self.pairs,
@@ -72,79 +70,76 @@ class Manifest:
             "rejected": dict(sorted(self.rejected().items())),
             "episodes": dict(sorted(self.episodes.items())),
         }
-        part = self.folder / f"{MANIFEST}.part"
-        with part.open("w") as file:
-            json.dump(content, file, indent=1)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(self.folder / MANIFEST)
+        self.store.write(MANIFEST, json.dumps(content, indent=1).encode())
 
 
-def open_manifest(folder: Path, request: RecordingRequest) -> Manifest:
-    """Return the manifest of `folder`, made anew or taken up where a recording stopped.
+def open_manifest(store: Store, request: RecordingRequest) -> Manifest:
+    """Return the manifest of a store, made anew or taken up where a recording stopped.
 
     Episodes that were finished but not yet entered, because the process was killed in between,
-    are entered.
+    are entered where they can be read. Nothing is written yet.
 
     Raises:
-        OccupiedOutput: If the folder holds episodes without a manifest.
+        OccupiedOutput: If the store holds episodes without a manifest.
         OtherRequest: If another recording began there.
         BadManifest: If the manifest cannot be read.
-        DamagedEpisode: If an episode has changed since it was entered.
+        DamagedEpisode, BadEpisode: If an episode has changed since it was finished.
     """
-    path = folder / MANIFEST
-    if not path.exists():
-        held = sorted(folder.glob("*.mcap*"))
+    sizes = store.sizes()
+    if MANIFEST not in sizes:
+        held = sorted(name for name in sizes if ".mcap" in name)
         if held:
-            raise OccupiedOutput(folder, f"{len(held)} recordings, such as {held[0].name}")
-        manifest = Manifest(folder, request, request.pairs)
-    else:
-        content = _read(path)
-        differences = _differences(content["settings"], request.settings)
-        if differences:
-            raise OtherRequest(folder, differences)
-        pairs = max(request.pairs, content["pairs"])
-        manifest = Manifest(folder, request, pairs, _checked(folder, content["episodes"]))
+            raise OccupiedOutput(store.name, f"{len(held)} recordings, such as {held[0]}")
+        return Manifest(store, request, request.pairs)
+    content = read_manifest(store)
+    others = differences(content["settings"], request.settings)
+    if others:
+        raise OtherRequest(store.name, others)
+    episodes = {}
+    for name, entry in content["episodes"].items():
+        size, written = sizes.get(f"{name}.mcap"), entry["bytes"]
+        # A file that was removed is recorded again.
+        if size is not None:
+            if size != written:
+                raise DamagedEpisode(f"{store.name}/{name}.mcap", size, written)
+            episodes[name] = entry
+    manifest = Manifest(store, request, max(request.pairs, content["pairs"]), episodes)
+    if store.folder is not None:
         for index in manifest.missing():
-            episode = folder / f"{request.episode_id(index)}.mcap"
-            if episode.exists():
-                manifest.episodes[episode.stem] = manifest_entry(episode)
-    manifest.write()
+            name = request.episode_id(index)
+            if f"{name}.mcap" in sizes:
+                manifest.episodes[name] = manifest_entry(store.folder / f"{name}.mcap", request)
     return manifest
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_manifest(store: Store) -> dict[str, Any]:
+    """Return the content of `manifest.json`.
+
+    Raises:
+        BadManifest: If it does not say what was recorded.
+        StoreFailed: If there is none.
+    """
     try:
-        content: dict[str, Any] = json.loads(path.read_text())
+        content: dict[str, Any] = json.loads(store.read(MANIFEST))
         version = content["version"]
         if version != VERSION:
             raise ValueError(f"it has version {version}, this dnet writes {VERSION}")
-        if not {"settings", "pairs", "episodes"} <= set(content):
-            raise ValueError("it lacks settings, pairs or episodes")
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadManifest(path, str(error)) from error
+        if not isinstance(content["pairs"], int) or not isinstance(content["settings"], dict):
+            raise TypeError("its pairs or settings are none")
+        for name, entry in content["episodes"].items():
+            if not _is_entry(entry):
+                raise TypeError(f"it says no bytes, hash, frames and rejections of {name}")
+    except KeyError as error:
+        raise BadManifest(f"{store.name}/{MANIFEST}", f"it lacks {error}") from error
+    except (ValueError, TypeError, AttributeError) as error:
+        raise BadManifest(f"{store.name}/{MANIFEST}", str(error)) from error
     return content
 
 
-def _checked(folder: Path, episodes: Mapping[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the entries whose file is there; a file that was removed is recorded again."""
-    found = {}
-    for name, entry in episodes.items():
-        path = folder / f"{name}.mcap"
-        if path.exists():
-            if path.stat().st_size != entry["bytes"]:
-                raise DamagedEpisode(path, path.stat().st_size, entry["bytes"])
-            found[name] = entry
-    return found
-
-
-def _differences(old: Any, new: Any, name: str = "") -> list[str]:
-    """Return what differs between two settings, one line each."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        keys = sorted(old.keys() | new.keys())
-        return [
-            line
-            for key in keys
-            for line in _differences(old.get(key), new.get(key), f"{name}.{key}".lstrip("."))
-        ]
-    return [] if old == new else [f"{name} {old} there, {new} now"]
+def _is_entry(entry: Any) -> bool:
+    return (
+        isinstance(entry["bytes"], int)
+        and isinstance(entry["sha256"], str)
+        and isinstance(entry["frames"], int)
+        and all(isinstance(count, int) for count in entry["rejected"].values())
+    )

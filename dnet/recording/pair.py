@@ -1,7 +1,8 @@
-"""One pair: a rollout in the laboratory, written as an episode."""
+"""One pair: a rollout in the laboratory, written as an episode and kept in a store."""
 
 import hashlib
 import os
+import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -13,9 +14,11 @@ import numpy as np
 import psutil
 
 from dnet.datasets.reader import EpisodeReader
+from dnet.errors import BadEpisode, OtherRequest
 from dnet.laboratory import Laboratory
 from dnet.recorders.episode import EpisodeWriter
-from dnet.recording.request import RecordingRequest
+from dnet.recording.request import RecordingRequest, differences
+from dnet.recording.store import Store
 from dnet.sim.observe import observe
 from dnet.sim.rollout import Rollout
 from dnet.types import EpisodeMeta
@@ -32,6 +35,8 @@ class PairReport:
     """Wall time that it took."""
     cpu_seconds: float
     """Processor time that it took."""
+    host: str
+    """Machine that recorded it."""
     worker: int
     """Number of the process that recorded it."""
     memory: int
@@ -42,22 +47,23 @@ def record_pair(
     lab: Laboratory,
     request: RecordingRequest,
     index: int,
-    folder: Path,
+    store: Store,
     *,
     shape_done: Callable[[], None],
 ) -> PairReport:
-    """Record pair `index` of a request into `folder`, as `EPISODE.mcap`.
+    """Record pair `index` of a request, as `EPISODE.mcap` of a store.
 
     Args:
         lab: Where it happens.
         request: What to record.
         index: Which pair, from 0; pairs do not depend on each other.
-        folder: For the file, which is called `.mcap.part` until it is whole.
+        store: For the file, which is called `.mcap.part` until it is whole.
         shape_done: Called after each shape; may raise to stop, which leaves the `.part` readable.
 
     Raises:
         NoValidShape: If nothing of what is drawn will do.
         BadNumber: If the simulation diverges.
+        NoSpace, StoreFailed: If there is no room for it, or the store does not take it.
     """
     wall, cpu = perf_counter(), process_time()
     seed = (request.seed, index)
@@ -77,47 +83,59 @@ def record_pair(
     )
     name = request.episode_id(index)
     meta = EpisodeMeta(name, request.seed, index, rollout.scene, request.settings)
-    path = folder / f"{name}.mcap"
-    with EpisodeWriter(
-        path,
-        meta,
-        arms=lab.arms,
-        attachments=lab.attachments(rollout.scene.tissue),
-        camera=request.laboratory.bullet.camera,
-    ) as writer:
-        for frame in rollout.frames(request.shapes):
-            writer.add(frame)
-            if frame.kind == "shape":
-                shape_done()
-        deviations = 1e3 * np.array(rollout.deviations)
-        writer.finish(
-            {
-                "frames": len(writer),
-                "rejected": dict(sorted(rollout.rejected.items())),
-                "deviation_mm": {
-                    "mean": round(float(deviations.mean()), 2),
-                    "worst": round(float(deviations.max()), 2),
-                },
-            }
-        )
+    with store.scratch(request.episode_bytes()) as scratch:
+        path = scratch / f"{name}.mcap"
+        with EpisodeWriter(
+            path,
+            meta,
+            arms=lab.arms,
+            attachments=lab.attachments(rollout.scene.tissue),
+            camera=request.laboratory.bullet.camera,
+        ) as writer:
+            for frame in rollout.frames(request.shapes):
+                writer.add(frame)
+                if frame.kind == "shape":
+                    shape_done()
+            writer.finish(_result(rollout, len(writer)))
+        entry = manifest_entry(path, request)
+        store.keep(path)
     return PairReport(
         episode=name,
-        entry=manifest_entry(path),
+        entry=entry,
         seconds=perf_counter() - wall,
         cpu_seconds=process_time() - cpu,
+        host=platform.node(),
         worker=os.getpid(),
         memory=psutil.Process().memory_info().rss,
     )
 
 
-def manifest_entry(path: Path) -> dict[str, Any]:
+def _result(rollout: Rollout, frames: int) -> dict[str, Any]:
+    deviations = 1e3 * np.array(rollout.deviations)
+    return {
+        "frames": frames,
+        "rejected": dict(sorted(rollout.rejected.items())),
+        "deviation_mm": {
+            "mean": round(float(deviations.mean()), 2),
+            "worst": round(float(deviations.max()), 2),
+        },
+    }
+
+
+def manifest_entry(path: Path, request: RecordingRequest) -> dict[str, Any]:
     """Return what a manifest says of a finished episode: read from the file itself.
 
     Raises:
         BadEpisode: If it is not a whole episode.
+        OtherRequest: If it was recorded for another request.
     """
     with EpisodeReader(path) as episode:
-        result = episode.result or {}
+        result, settings = episode.result, episode.meta.settings
+    if result is None:
+        raise BadEpisode(path, "is not finished", "remove it, and the same call records it again")
+    others = differences(settings, request.settings)
+    if others:
+        raise OtherRequest(path, others)
     content = path.read_bytes()
     return {
         "bytes": len(content),

@@ -3,18 +3,19 @@
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
+from contextlib import contextmanager
 from multiprocessing import connection, get_context, parent_process
-from pathlib import Path
 from typing import Any
 
 from dnet.errors import WorkerDied
-from dnet.laboratory import Laboratory, laboratory
+from dnet.laboratory import laboratory
 from dnet.recording.pair import PairReport, record_pair
 from dnet.recording.request import RecordingRequest
+from dnet.recording.store import Store
+from dnet.recording.worker import kept_laboratory
 
 POLL = 0.2
 """Seconds between two looks at how far the workers are."""
@@ -24,22 +25,22 @@ Progress = Callable[[int], None]
 
 
 def record_here(
-    request: RecordingRequest, indices: Sequence[int], folder: Path, progress: Progress
-) -> Generator[PairReport]:
+    request: RecordingRequest, indices: Sequence[int], store: Store, progress: Progress
+) -> Generator[PairReport, None, None]:
     """Record pairs one after another in this process."""
     with laboratory(request.laboratory) as lab:
         for index in indices:
-            yield record_pair(lab, request, index, folder, shape_done=lambda: progress(1))
+            yield record_pair(lab, request, index, store, shape_done=lambda: progress(1))
 
 
 def record_in_processes(
     request: RecordingRequest,
     indices: Sequence[int],
-    folder: Path,
+    store: Store,
     progress: Progress,
     *,
     workers: int,
-) -> Generator[PairReport]:
+) -> Generator[PairReport, None, None]:
     """Record pairs on `workers` processes, and yield each as it is finished.
 
     Ctrl-C, or closing the iterator, lets every worker close the file that it writes. Workers
@@ -47,31 +48,49 @@ def record_in_processes(
 
     Raises:
         WorkerDied: If a worker is killed; what was finished is kept.
+        OtherWorker: If the workers do not see what this process sees.
         DnetError: What a worker raises.
     """
     context = get_context("spawn")
     done, stop = context.Value("q", 0), context.Event()
-    # One thread each: the workers are the parallelism.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start, initargs=(request, folder, done, stop)
+        workers, mp_context=context, initializer=_start, initargs=(request, store, done, stop)
     )
     reported = 0
     try:
-        pending: set[Future[PairReport]] = {pool.submit(_record, index) for index in indices}
+        with _inherited():
+            pending: set[Future[PairReport]] = {pool.submit(_record, index) for index in indices}
         while pending:
             finished, pending = wait(pending, timeout=POLL, return_when=FIRST_COMPLETED)
             count = done.value
             progress(count - reported)
             reported = count
-            for future in finished:
+            # Those that failed come last: what was finished along with them is not lost.
+            for future in sorted(finished, key=lambda one: one.exception() is not None):
                 yield future.result()
     except BrokenProcessPool as error:
-        raise WorkerDied(folder) from error
+        raise WorkerDied(store.name) from error
     finally:
         stop.set()
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _inherited() -> Iterator[None]:
+    """Give the processes that are started here what they need from their first instruction on.
+
+    Ctrl-C reaches the whole process group, but only the parent says what it means. And each has
+    one thread: the workers are the parallelism.
+    """
+    added = {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"} - os.environ.keys()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        os.environ.update(dict.fromkeys(added, "1"))
+        yield
+    finally:
+        for name in added:
+            del os.environ[name]
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 class _Stopped(Exception):
@@ -79,23 +98,17 @@ class _Stopped(Exception):
 
 
 class _Worker:
-    """What a worker process keeps from one pair to the next."""
+    """What the parent told this process."""
 
-    life = ExitStack()
-    """Holds the laboratory for as long as the process lives."""
-    lab: Laboratory
     request: RecordingRequest
-    folder: Path
+    store: Store
     done: Any
     stop: Any
 
 
-def _start(request: RecordingRequest, folder: Path, done: Any, stop: Any) -> None:
-    # Ctrl-C reaches the whole process group; the parent says what it means.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _start(request: RecordingRequest, store: Store, done: Any, stop: Any) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    _Worker.request, _Worker.folder, _Worker.done, _Worker.stop = request, folder, done, stop
-    _Worker.lab = _Worker.life.enter_context(laboratory(request.laboratory))
+    _Worker.request, _Worker.store, _Worker.done, _Worker.stop = request, store, done, stop
 
 
 def _end_with_parent() -> None:
@@ -106,11 +119,17 @@ def _end_with_parent() -> None:
 
 
 def _record(index: int) -> PairReport:
-    return record_pair(_Worker.lab, _Worker.request, index, _Worker.folder, shape_done=_shape_done)
+    _stop_if_told()
+    lab = kept_laboratory(_Worker.request, _Worker.store)
+    return record_pair(lab, _Worker.request, index, _Worker.store, shape_done=_shape_done)
 
 
 def _shape_done() -> None:
     with _Worker.done.get_lock():
         _Worker.done.value += 1
+    _stop_if_told()
+
+
+def _stop_if_told() -> None:
     if _Worker.stop.is_set():
         raise _Stopped

@@ -4,17 +4,20 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from time import sleep
 from typing import Any, TypeVar
 
+from fsspec.core import url_to_fs
+
 from dnet.errors import MissingExtra, NoSpace, StoreFailed, UnknownStore
 
 S3 = ("s3", "s3a")
+BUCKETS = (*S3, "gs", "gcs", "abfs", "abfss", "az")
+"""Stores in which a folder is but the beginning of a name; to make one could make a bucket."""
 LASTING = (FileNotFoundError, PermissionError, NotImplementedError)
-"""Failures that do not pass: no such bucket, no leave to write there, a store to read from."""
+"""Failures that do not pass: no such bucket, no leave to write, a store to read from only."""
 
 _Value = TypeVar("_Value")
 
@@ -24,9 +27,10 @@ class RemoteStore:
     """Files of any store that fsspec can write to, by URL.
 
     Addresses and credentials come from where the store's own tools have them: for S3, the
-    environment (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL`) or `~/.aws`. There is no lock: two
-    recordings of the same request in the same place write the same bytes twice; their manifests
-    may then lack episodes, which the next call records again.
+    environment (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL`) or `~/.aws`.
+
+    There is no lock. Two recordings of the same request in one place write the same bytes; the
+    manifest of one may lack episodes of the other, which the next call records again.
 
     Raises:
         UnknownStore: If fsspec knows no such store.
@@ -36,13 +40,12 @@ class RemoteStore:
     name: str
     """Its URL, without a slash at the end."""
     pauses: tuple[float, ...] = (1.0, 5.0, 25.0)
-    """Seconds before each further try of an upload, besides the tries that a store's own client
-    makes."""
+    """Seconds before each further try to write, besides the tries of the store's own client."""
 
     def __post_init__(self) -> None:
         """Refuse what is no store before anything is recorded."""
         if not self._place[1].strip("/"):
-            raise UnknownStore(self.name, "it names no bucket")
+            raise UnknownStore(self.name, "it names no folder or bucket")
 
     @property
     def folder(self) -> None:
@@ -50,13 +53,18 @@ class RemoteStore:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Make the folder, where a store has such a thing."""
+        """Make the folder, where a store has such a thing; nobody is kept out.
+
+        Raises:
+            StoreFailed: If it cannot be made.
+        """
         files, path = self._place
-        self._try(lambda: files.makedirs(path, exist_ok=True))
+        if self.name.partition("://")[0] not in BUCKETS:
+            self._insist(lambda: files.makedirs(path, exist_ok=True))
         yield
 
     def check_room(self, episodes: int, *, episode_bytes: int) -> None:
-        """Refuse to begin without room for an episode on this machine's disk.
+        """Refuse to begin an episode without room for it on this machine's disk.
 
         Raises:
             NoSpace: If not even one of `episode_bytes` fits.
@@ -75,7 +83,109 @@ class RemoteStore:
         files, path = self._place
         files.invalidate_cache()
         try:
-            found = self._try(lambda: files.ls(path, detail=True))
+            found = files.ls(path, detail=True)
         except FileNotFoundError:
             return {}
+        except Exception as error:
+            raise StoreFailed(self.name, _said(error)) from error
         return {Path(one["name"]).name: one["size"] for one in found if one["type"] == "file"}
+
+    def read(self, name: str) -> bytes:
+        """Return the content of a file.
+
+        Raises:
+            StoreFailed: If there is none, or the store does not answer.
+        """
+        files, path = self._place
+        try:
+            content: bytes = files.cat_file(f"{path}/{name}")
+        except Exception as error:
+            raise StoreFailed(self.name, _said(error)) from error
+        return content
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file as a whole.
+
+        Raises:
+            StoreFailed: If no try succeeds.
+        """
+        files, path = self._place
+        self._insist(lambda: files.pipe_file(f"{path}/{name}", content))
+
+    def append(self, name: str, line: str) -> None:
+        """Add a line to a file by writing all of it anew: a store's files do not grow.
+
+        Raises:
+            StoreFailed: If it cannot be read or written.
+        """
+        files, path = self._place
+
+        def rewrite() -> None:
+            try:
+                old = files.cat_file(f"{path}/{name}")
+            except FileNotFoundError:
+                old = b""
+            files.pipe_file(f"{path}/{name}", old + f"{line}\n".encode())
+
+        self._insist(rewrite)
+
+    @contextmanager
+    def scratch(self, episode_bytes: int) -> Iterator[Path]:
+        """Return a folder of this machine to record an episode in, gone afterwards.
+
+        A process that is killed leaves it in the system's folder for such things.
+
+        Raises:
+            NoSpace: If it has no room for `episode_bytes`.
+        """
+        self.check_room(1, episode_bytes=episode_bytes)
+        with TemporaryDirectory(prefix="dnet-") as scratch:
+            yield Path(scratch)
+
+    def keep(self, path: Path) -> None:
+        """Upload a finished episode, see that all of it came, and remove it here.
+
+        Raises:
+            StoreFailed: If no try succeeds.
+        """
+        files, place = self._place
+        name, size = f"{place}/{path.name}", path.stat().st_size
+
+        def upload() -> None:
+            files.put_file(str(path), name)
+            arrived = files.info(name)["size"]
+            if arrived != size:
+                raise OSError(f"{arrived} of {size} bytes of {path.name} arrived")
+
+        self._insist(upload)
+        path.unlink()
+
+    @property
+    def _place(self) -> tuple[Any, str]:
+        """The store's fsspec file system, which fsspec keeps for each process, and our path."""
+        try:
+            found: tuple[Any, str] = url_to_fs(self.name)
+        except ImportError as error:
+            if self.name.partition("://")[0] in S3:
+                raise MissingExtra("s3fs", "s3", f"writing to {self.name}") from error
+            raise UnknownStore(self.name, str(error)) from error
+        except ValueError as error:
+            raise UnknownStore(self.name, str(error)) from error
+        return found
+
+    def _insist(self, action: Callable[[], _Value]) -> _Value:
+        """Do what may fail for a while, again after each pause."""
+        pauses = iter(self.pauses)
+        while True:
+            try:
+                return action()
+            # Stores raise what they like: botocore's errors are not even OSErrors.
+            except Exception as error:
+                pause = None if isinstance(error, LASTING) else next(pauses, None)
+                if pause is None:
+                    raise StoreFailed(self.name, _said(error)) from error
+            sleep(pause)
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -55,3 +55,15 @@ class RecordingRequest:
             frame += 5 * camera.width * camera.height
         frames = 1 + self.shapes * (1 + self.rate * SECONDS_A_SHAPE)
         return int(EPISODE_OVERHEAD + frames * frame)
+
+
+def differences(old: Any, new: Any, name: str = "") -> list[str]:
+    """Return what differs between two settings, one line each; what is absent is None."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = sorted(old.keys() | new.keys())
+        return [
+            line
+            for key in keys
+            for line in differences(old.get(key), new.get(key), f"{name}.{key}".lstrip("."))
+        ]
+    return [] if old == new else [f"{name} {old} there, {new} now"]

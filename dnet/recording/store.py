@@ -55,13 +55,13 @@ class Store(Protocol):
         ...
 
 
-def open_store(out: str | Path, *, apart: bool = False) -> Store:
+def open_store(out: str | Path, *, shared: bool = False) -> Store:
     """Return the store that `out` names: a folder, or a URL such as `s3://bucket/data`.
 
     Args:
         out: Nothing is made there yet.
-        apart: Whether episodes in the making stay out of sight in a folder, because workers that
-            are lost may still write; an object store keeps them apart anyway.
+        shared: Whether other machines write there too. In a folder, episodes in the making then
+            stay out of each other's way: a lost worker may still write.
 
     Raises:
         UnknownStore: If fsspec knows no such store.
@@ -69,7 +69,9 @@ def open_store(out: str | Path, *, apart: bool = False) -> Store:
     """
     scheme, separator, rest = str(out).partition("://")
     if isinstance(out, Path) or not separator:
-        return FolderStore(Path(out), in_place=not apart)
-    if scheme in ("file", "local"):
-        return FolderStore(Path(rest), in_place=not apart)
-    return RemoteStore(str(out).rstrip("/"))
+        folder = Path(out)
+    elif scheme in ("file", "local"):
+        folder = Path(rest)
+    else:
+        return RemoteStore(f"{scheme}://{rest.rstrip('/')}")
+    return FolderStore(folder.resolve(), in_place=False) if shared else FolderStore(folder)
