@@ -23,7 +23,9 @@ class Pace:
 class Worker:
     """What one process recorded."""
 
+    host: str
     worker: int
+    """Number of the process on its host."""
     episodes: int
     shapes: int
     pace: Pace
@@ -53,6 +55,7 @@ class Speed:
 
 
 class _Timing(NamedTuple):
+    host: str
     worker: int
     shapes: int
     seconds: float
@@ -81,17 +84,17 @@ def read_speed(directory: Path) -> Speed | None:
         worker=_pace(shapes, sum(timing.seconds for timing in timings)),
         machine=_pace(shapes, _covered(timings)),
         workers=tuple(
-            _worker(number, [timing for timing in timings if timing.worker == number])
-            for number in sorted({timing.worker for timing in timings})
+            _worker(*process, [timing for timing in timings if timing[:2] == process])
+            for process in sorted({timing[:2] for timing in timings})
         ),
     )
 
 
-def _worker(number: int, timings: list[_Timing]) -> Worker:
+def _worker(host: str, number: int, timings: list[_Timing]) -> Worker:
     shapes = sum(timing.shapes for timing in timings)
     pace = _pace(shapes, sum(timing.seconds for timing in timings))
     first, last = timings[0].memory, timings[-1].memory
-    return Worker(number, len(timings), shapes, pace, first_bytes=first, last_bytes=last)
+    return Worker(host, number, len(timings), shapes, pace, first_bytes=first, last_bytes=last)
 
 
 def _pace(shapes: int, seconds: float) -> Pace:
@@ -112,6 +115,7 @@ def _read(line: str) -> _Timing | None:
     try:
         record = json.loads(line)
         timing = _Timing(
+            str(record["host"]) if "host" in record else "",
             int(record["worker"]),
             int(record["shapes"]),
             float(record["seconds"]),
@@ -122,6 +126,6 @@ def _read(line: str) -> _Timing | None:
     except (ValueError, TypeError, KeyError, OverflowError, OSError, RecursionError):
         return None
     # JSON knows NaN and Infinity where Python writes it.
-    if not all(map(math.isfinite, timing[:5])) or min(timing[1:4]) < 0:
+    if not all(map(math.isfinite, timing[1:6])) or min(timing[2:5]) < 0:
         return None
     return timing

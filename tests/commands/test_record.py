@@ -125,10 +125,8 @@ def test_rerun_accepts_an_episode(recorded: Path) -> None:
 
 def test_frames_on_the_way_images_and_noise_are_there_when_asked_for(tmp_path: Path) -> None:
     out = tmp_path / "data"
-    main(
-        ["record", str(out), "--pairs", "1", "--shapes", "1", "--rate", "4", "--images"]
-        + ["--depth-noise", "1"]
-    )
+    extras = ["--rate", "4", "--images", "--depth-noise", "1"]
+    main(["record", str(out), "--pairs", "1", "--shapes", "1", *extras])
     with EpisodeReader(out / "episode-0-00000.mcap") as episode:
         assert episode.kinds[0] == "rest"
         assert set(episode.kinds[1:-1]) == {"way"}

@@ -38,6 +38,9 @@ class Still:
     def settle(self) -> Settling:
         return Settling(settled=True, steps=0, least_volume_ratio=1.0)
 
+    def foresee(self, displacement: Point) -> float:
+        return 1.0
+
     def deviation(self) -> float:
         return 0.0
 
