@@ -124,7 +124,8 @@ def test_restoring_brings_both_arms_and_the_object_back(driven: BulletWorld) -> 
     driven.restore()
     np.testing.assert_array_equal(driven.nodes(), before)
     np.testing.assert_array_equal(driven.joints, joints)
-    np.testing.assert_array_equal(shape(driven), first)
+    # Bullet keeps a trace of what was before a `restore`; only a `reset` starts anew.
+    np.testing.assert_allclose(shape(driven), first, atol=1e-6)
 
 
 def shape(world: BulletWorld) -> Nodes:
