@@ -1,5 +1,6 @@
 """`dnet demo`: the whole chain on a small scale, each step with the command that does it."""
 
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -23,7 +24,7 @@ class Demo:
 
     out: Path = Path("demo")
     """Directory for everything; made if need be."""
-    pairs: int = 8
+    pairs: int = 12
     """Episodes to record."""
     shapes: int = 20
     """Shapes an episode."""
@@ -45,11 +46,13 @@ class Demo:
 
         console = Console()
         steps = Steps(self.out, {**asdict(self), "out": str(self.out)}, console)
+        workers = min(os.cpu_count() or 1, self.pairs)
         data, train, servo = self.out / "data", self.out / "train", self.out / "servo"
         steps.run(
             "record",
-            f"dnet record {data} --pairs {self.pairs} --shapes {self.shapes} --seed {self.seed}",
-            Record(data, pairs=self.pairs, shapes=self.shapes, seed=self.seed),
+            f"dnet record {data} --pairs {self.pairs} --shapes {self.shapes} --seed {self.seed} "
+            f"--workers {workers}",
+            Record(data, pairs=self.pairs, shapes=self.shapes, seed=self.seed, workers=workers),
         )
         steps.run("list", f"dnet inspect ls {data}", Inspect(List(data)))
         steps.run(

@@ -5,6 +5,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -57,11 +58,12 @@ class Steps:
 
 
 def held_out_goal(data: Path, train: Path) -> tuple[Path, int]:
-    """Return an episode that was not trained on, and the number of its last shape."""
+    """Return an episode that was not trained on, and its shape farthest from rest."""
     name = read_config(train)["data"]["validation"][0]
     path = data / f"{name}.mcap"
     with EpisodeReader(path) as episode:
-        return path, len(episode) - 1
+        motions = np.linalg.norm(episode.grasps - episode.grasps[0], axis=1)
+        return path, int(np.argmax(motions))
 
 
 def summary(out: Path, seconds: dict[str, float]) -> Table:
