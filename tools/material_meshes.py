@@ -42,8 +42,7 @@ CANDIDATES: tuple[Cells, ...] = (
 LEAST_THICKNESS = 4
 """Cells through the thickness that a mesh needs: with fewer, bending is too stiff by a fifth."""
 MOST_NODES = 450
-"""A budget, not a law: with more, PyBullet settles fewer than 1.6 shapes in a processor second, and
-the paper's 30,000 take longer than an evening."""
+"""A budget for time, not a law, and set after the figures were seen: 500 would choose 9 x 9 x 4."""
 CHUNKS = 50
 """Parts in which points are looked up: all at once would take a gigabyte."""
 TIMED = 3
