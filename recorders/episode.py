@@ -11,17 +11,13 @@ The topics, all in the world frame with log times in nanoseconds of simulation f
     /gripper             foxglove.PoseInFrame        tip of the moving arm's jaws
     /camera/calibration  foxglove.CameraCalibration  once, at time 0, if there is a camera
     /camera/depth        foxglove.RawImage           32FC1, metres; only where frames keep images
-    /camera/mask         foxglove.RawImage           mono8: 0 nothing, 1 the object, 2 and more
-                                                     other bodies; goes with each depth
+    /camera/mask         foxglove.RawImage           mono8, goes with each depth
     /frame               dnet.Frame (JSON)           index, kind, time; ends each frame
     /step                dnet.Step (JSON)            one turn of the servo loop; servo runs only
     /log                 foxglove.Log                lines for people
 
-Pixel (u, v), counted from 0 at the upper left, looks along inv(K) @ (u, v, 1) in the frame
-"camera" (x right, y down, z forward), with no half pixel added; depth is along its z.
-
-Metadata `dnet.episode` comes first and survives a crash; `dnet.result` comes last, and its
-absence says that the recording did not end by itself.
+README.md beside this module describes every field, unit, frame and key, and what may change
+without another `SCHEMA_VERSION`.
 """
 
 from collections.abc import Mapping
