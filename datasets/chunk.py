@@ -29,6 +29,11 @@ def decompress(record: memoryview) -> tuple[memoryview, int]:
         raise ValueError(str(error)) from error
 
 
+def is_plain(record: memoryview) -> bool:
+    """Return whether the records of a chunk that can be decompressed lie in it as they are."""
+    return _CHUNK.unpack_from(record, RECORD.size)[-1] == 0
+
+
 def _decompress(record: memoryview) -> tuple[memoryview, int]:
     opcode, length = RECORD.unpack_from(record)
     if opcode != Opcode.CHUNK or length != len(record) - RECORD.size:
@@ -60,5 +65,5 @@ def _plain(content: memoryview, compression: str, size: int) -> memoryview:
         frame = lz4.frame.LZ4FrameDecompressor()
         return memoryview(frame.decompress(content, max_length=size + 1))
     if compression:
-        raise ValueError(f"compression {compression!r}; only zstd and lz4 are known")
+        raise ValueError(f"compression {compression[:40]!r}; only zstd and lz4 are known")
     return content

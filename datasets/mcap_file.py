@@ -1,27 +1,26 @@
 """An MCAP container opened for random access: its index read once, its bytes mapped, not copied.
 
 The stock Python reader decompresses and parses a whole chunk for every query. This one reads the
-MessageIndex records (https://mcap.dev/spec), maps the file and slices payloads out of it. Every
-length in the file is checked against the file before it is believed, so a damaged or hostile
-file is refused, not obeyed.
+MessageIndex records (https://mcap.dev/spec), maps the file, or fetches ranges of it from a store,
+and slices payloads out of it. Every length in the file is checked against the file before it is
+believed, so a damaged or hostile file is refused, not obeyed.
 """
 
-import mmap
 import struct
 import zlib
 from collections import OrderedDict
-from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int64
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
-from dnet.datasets.chunk import decompress
+from dnet.datasets.chunk import decompress, is_plain
 from dnet.datasets.refusals import damaged
-from dnet.datasets.summary import MAGIC, RECORD, UNREADABLE, Place, parse, read_summary
-from dnet.errors import BadEpisode, MissingPath
+from dnet.datasets.sources import Source, open_source
+from dnet.datasets.summary import MAGIC, RECORD, UNREADABLE, ChunkPlace, Extent, parse, read_summary
+from dnet.errors import BadEpisode
+from dnet.types import Place
 
 CACHED_CHUNKS = 4
 
@@ -38,37 +37,40 @@ class McapFile:
     """Topics, messages, metadata and attachments of one MCAP file.
 
     Args:
-        path: The file; it must have a summary and message indexes, as finished files do.
+        path: The file, or its URL; it must have a summary and message indexes, as finished files
+            do.
+        source: Its bytes, if they are at hand already.
+        check: Whether to hold each chunk against its checksum when it is first read.
 
     Raises:
         MissingPath: If there is no such file.
         BadEpisode: If it is not an MCAP file, or is cut off, or is damaged.
+        Unfetched: If a store does not answer.
     """
 
-    def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise MissingPath(path, "episode", "`dnet inspect ls DIRECTORY` lists what is there")
+    def __init__(self, path: Place, *, source: Source | None = None, check: bool = True) -> None:
         self.path = path
-        with path.open("rb") as file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise BadEpisode(path, "is not an MCAP file", "give an .mcap of `dnet record`")
-            self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        self._bytes = memoryview(self._map)
+        self._check = check
+        self._source = open_source(path) if source is None else source
         self._cache: OrderedDict[int, memoryview] = OrderedDict()
         self._checked = set[int]()
         try:
-            self._summary = read_summary(path, self._bytes)
-        except BadEpisode:
+            if self._source.view(0, min(len(MAGIC), len(self._source))) != MAGIC:
+                raise BadEpisode(path, "is not an MCAP file", "give an .mcap of `dnet record`")
+            self._summary = read_summary(path, self._source)
+        except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Let go of the file; views that were handed out stay valid as long as they live."""
         self._cache.clear()
-        # While an array looks at the map, the system unmaps it with the last one.
-        with suppress(BufferError):
-            self._bytes.release()
-            self._map.close()
+        self._source.close()
+
+    @property
+    def chunks(self) -> tuple[ChunkPlace, ...]:
+        """Where the chunks lie, in file order."""
+        return tuple(self._summary.chunks)
 
     def entries(self, topic: str) -> Entries:
         """Return where the messages of `topic` lie, in file order; none for an unknown topic."""
@@ -91,13 +93,22 @@ class McapFile:
         Raises:
             BadEpisode: If there is no message, or the chunk is damaged.
         """
+        content = message_at(self._records(chunk), offset)
+        if content is None:
+            raise damaged(self.path, f"it has no message at byte {offset} of chunk {chunk}")
+        return content
+
+    def position(self, chunk: int, offset: int) -> int | None:
+        """Return the byte of the file at which the content of that message begins.
+
+        None if the chunk is compressed.
+        """
         records = self._records(chunk)
-        if offset + _MESSAGE.size <= len(records):
-            opcode, length, *_ = _MESSAGE.unpack_from(records, offset)
-            end = offset + RECORD.size + length
-            if opcode == Opcode.MESSAGE and offset + _MESSAGE.size <= end <= len(records):
-                return records[offset + _MESSAGE.size : end]
-        raise damaged(self.path, f"it has no message at byte {offset} of chunk {chunk}")
+        first, length, _ = self._summary.chunks[chunk]
+        if not is_plain(self._source.view(first, first + length)):
+            return None
+        # The records are the end of a chunk.
+        return first + length - len(records) + offset + _MESSAGE.size
 
     def metadata(self, name: str) -> dict[str, str] | None:
         """Return the metadata record called `name`, or None."""
@@ -134,13 +145,13 @@ class McapFile:
         chunks = self._summary.chunks
         # A chunk's indexes lie between it and the next chunk: no two chunks can share one.
         first = chunks[number].offset + chunks[number].length
-        limit = chunks[number + 1].offset if number + 1 < len(chunks) else len(self._bytes)
+        limit = chunks[number + 1].offset if number + 1 < len(chunks) else len(self._source)
         start = offset + _MESSAGE_INDEX.size
         if first <= offset and start <= limit:
-            opcode, length, _, size = _MESSAGE_INDEX.unpack_from(self._bytes, offset)
+            opcode, length, _, size = _MESSAGE_INDEX.unpack(self._source.view(offset, start))
             whole = length == size + 6 and size <= limit - start and size % _TIME.size == 0
             if opcode == Opcode.MESSAGE_INDEX and whole:
-                pairs = _TIME.iter_unpack(self._bytes[start : start + size])
+                pairs = _TIME.iter_unpack(self._source.view(start, start + size))
                 return sorted((at, time) for time, at in pairs)
         raise damaged(self.path, f"the message index of its chunk {number} is broken")
 
@@ -152,10 +163,10 @@ class McapFile:
             return cached
         offset, length, _ = self._summary.chunks[number]
         try:
-            records, crc = decompress(self._bytes[offset : offset + length])
+            records, crc = decompress(self._source.view(offset, offset + length))
         except ValueError as error:
             raise damaged(self.path, f"its chunk {number} is unreadable ({error})") from error
-        if number not in self._checked:
+        if self._check and number not in self._checked:
             if crc and zlib.crc32(records) != crc:
                 raise damaged(self.path, f"its chunk {number} fails its checksum")
             self._checked.add(number)
@@ -164,12 +175,22 @@ class McapFile:
             self._cache.popitem(last=False)
         return records
 
-    def _record(self, place: Place, opcode: Opcode) -> memoryview:
-        offset, length = place
-        if length > len(self._bytes) or offset > len(self._bytes) - length:
+    def _record(self, extent: Extent, opcode: Opcode) -> memoryview:
+        offset, length = extent
+        if length > len(self._source) or offset > len(self._source) - length:
             raise ValueError("outside the file")
-        record = self._bytes[offset : offset + length]
+        record = self._source.view(offset, offset + length)
         kind, size = RECORD.unpack_from(record)
         if kind != opcode or size != length - RECORD.size:
             raise ValueError("not the record it should be")
         return record[RECORD.size :]
+
+
+def message_at(records: memoryview, offset: int) -> memoryview | None:
+    """Return the content of the message at `offset` of a chunk's records, None if none is there."""
+    if offset + _MESSAGE.size > len(records):
+        return None
+    opcode, length, *_ = _MESSAGE.unpack_from(records, offset)
+    end = offset + RECORD.size + length
+    whole = opcode == Opcode.MESSAGE and offset + _MESSAGE.size <= end <= len(records)
+    return records[offset + _MESSAGE.size : end] if whole else None

@@ -17,6 +17,13 @@ _XYZ = [
 ]
 _PLAIN = b"".join(entry.SerializeToString() for entry in _XYZ)
 
+MOST_FIELDS = 256
+"""Fields of a message that are still read, the fields of a point among them; dnet writes 12."""
+
+
+class NotFinite(ValueError):
+    """Numbers that are NaN or infinite."""
+
 
 def read_point_cloud(message: memoryview) -> Cloud:
     """Return the points of a foxglove.PointCloud message, read-only, (n, 3).
@@ -25,27 +32,42 @@ def read_point_cloud(message: memoryview) -> Cloud:
     with colours or other fields between them are copied.
 
     Raises:
-        ValueError: If the message is not a cloud of finite float32 x, y and z.
+        ValueError: If the message is not a cloud of float32 x, y and z.
+        NotFinite: If one of them is NaN or infinite.
     """
-    stride = 0
-    layout = b""
-    data = message[:0]
-    for field, value in _walk(message):
-        if field == _STRIDE:
-            stride = int.from_bytes(value, "little")
-        elif field == _FIELDS:
-            layout += bytes(value)
-        elif field == _DATA:
-            data = value
-    if layout == _PLAIN and stride == 12:
-        if len(data) % stride:
-            raise ValueError(f"{len(data)} bytes are no whole number of points")
-        points: Cloud = np.frombuffer(data, dtype="<f4").reshape(-1, 3)
-    else:
+    extent = packed_extent(message)
+    if extent is None:
         points = _copy(message)
+    else:
+        start, stop = extent
+        points = np.frombuffer(message[start:stop], dtype="<f4").reshape(-1, 3)
     if not np.isfinite(points).all():
-        raise ValueError("a cloud with NaN or infinite coordinates")
+        raise NotFinite("a cloud with NaN or infinite coordinates")
     return points
+
+
+def packed_extent(message: memoryview) -> tuple[int, int] | None:
+    """Return where in a foxglove.PointCloud message its points begin and end, twelve bytes each.
+
+    None if the points are not packed as three float32 alone.
+
+    Raises:
+        ValueError: If the message is none, or ends within a point.
+    """
+    stride = start = stop = 0
+    layout = b""
+    for field, begin, end in _walk(message):
+        if field == _STRIDE:
+            stride = int.from_bytes(message[begin:end], "little")
+        elif field == _FIELDS and len(layout) <= len(_PLAIN):
+            layout += bytes(message[begin:end])
+        elif field == _DATA:
+            start, stop = begin, end
+    if layout != _PLAIN or stride != 12:
+        return None
+    if (stop - start) % stride:
+        raise ValueError(f"{stop - start} bytes are no whole number of points")
+    return start, stop
 
 
 def _copy(message: memoryview) -> Cloud:
@@ -69,8 +91,8 @@ def _copy(message: memoryview) -> Cloud:
     return points
 
 
-def _walk(message: memoryview) -> list[tuple[int, memoryview]]:
-    """Return number and content of each field of a protobuf message."""
+def _walk(message: memoryview) -> list[tuple[int, int, int]]:
+    """Return number, begin and end of each field of a protobuf message."""
     fields = []
     place, end = 0, len(message)
     while place < end:
@@ -89,7 +111,10 @@ def _walk(message: memoryview) -> list[tuple[int, memoryview]]:
             raise ValueError(f"protobuf knows no wire type {kind}")
         if size > end - place:
             raise ValueError(f"a field of {size} bytes where {end - place} are left")
-        fields.append((tag >> 3, message[place : place + size]))
+        # A list of millions of empty fields would take fifty times the bytes of the message.
+        if len(fields) == MOST_FIELDS:
+            raise ValueError(f"more than {MOST_FIELDS} fields")
+        fields.append((tag >> 3, place, place + size))
         place += size
     return fields
 

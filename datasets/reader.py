@@ -2,19 +2,19 @@
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float64
 
 from dnet.datasets import messages
 from dnet.datasets.mcap_file import Entries, McapFile
-from dnet.datasets.point_cloud import read_point_cloud
+from dnet.datasets.point_cloud import packed_extent, read_point_cloud
+from dnet.datasets.sources import Source
 from dnet.errors import BadEpisode, MissingPath, NoSuchFrame
 from dnet.geometry.camera import Pinhole
-from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Look, Nodes, Transform
+from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Look, Nodes, Place, Transform
 
 SCHEMA_VERSION = "1"
 
@@ -29,6 +29,19 @@ _Source = TypeVar("_Source")
 _Value = TypeVar("_Value")
 
 
+class CloudPlace(NamedTuple):
+    """Where in a file the points of a cloud lie."""
+
+    chunk: int
+    """Byte at which the record of its chunk begins."""
+    length: int
+    """Bytes of that record."""
+    message: int
+    """Byte at which the message begins, in the chunk's records when decompressed."""
+    data: int | None
+    """Byte of the file at which its points lie as packed float32; None if they do not."""
+
+
 class EpisodeReader:
     """The frames, the goal and the steps of one episode.
 
@@ -36,14 +49,17 @@ class EpisodeReader:
     read-only. A reader can be sent to another process, which opens the file anew.
 
     Args:
-        path: An `.mcap` of `dnet record` or `dnet servo`.
+        path: An `.mcap` of `dnet record` or `dnet servo`, or the URL of one.
+        source: Its bytes, if they are at hand already.
+        check: Whether to hold each part of the file against its checksum when it is first read.
 
     Raises:
         MissingPath: If there is no such file.
         BadEpisode: If it is not an episode, or is cut off, or is damaged.
+        Unfetched: If a store does not answer.
     """
 
-    path: Path
+    path: Place
     meta: EpisodeMeta
     result: dict[str, Any] | None
     """What the recording said of itself at its end; None if it never got there."""
@@ -52,9 +68,9 @@ class EpisodeReader:
     times: Float64[np.ndarray, "_"]
     """Seconds of simulation at each frame, (n,)."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Place, *, source: Source | None = None, check: bool = True) -> None:
         self.path = path
-        self._file = McapFile(path)
+        self._file = McapFile(path, source=source, check=check)
         try:
             self.meta = self._read_meta()
             result = self._file.metadata("dnet.result")
@@ -80,7 +96,7 @@ class EpisodeReader:
     ) -> None:
         self.close()
 
-    def __reduce__(self) -> "tuple[type[EpisodeReader], tuple[Path]]":
+    def __reduce__(self) -> "tuple[type[EpisodeReader], tuple[Place]]":
         # A mapped file does not travel between processes; its path does.
         return type(self), (self.path,)
 
@@ -114,6 +130,22 @@ class EpisodeReader:
             BadEpisode: If the message is not a cloud.
         """
         return self._message(CLOUD, index, read_point_cloud)
+
+    def cloud_place(self, index: int) -> CloudPlace:
+        """Return where in the file the cloud of frame `index` lies.
+
+        Raises:
+            NoSuchFrame: If there is no such frame.
+            BadEpisode: If the message is not a cloud.
+        """
+        self._require(index)
+        _, number, offset = self._entries[CLOUD][index].tolist()
+        message = self._file.payload(number, offset)
+        extent = self._decode(CLOUD, packed_extent, message)
+        start = self._file.position(number, offset)
+        chunk = self._file.chunks[number]
+        data = None if extent is None or start is None else start + extent[0]
+        return CloudPlace(chunk.offset, chunk.length, offset, data)
 
     def nodes(self, index: int) -> Nodes:
         """Return the mesh nodes at frame `index`: ground truth for scores."""
@@ -201,7 +233,7 @@ class EpisodeReader:
         content = self._file.attachment(name)
         if content is None:
             held = ", ".join(self.attachments) or "nothing"
-            raise MissingPath(Path(name), "attachment", f"{self.path} holds {held}")
+            raise MissingPath(name, "attachment", f"{self.path} holds {held}")
         return content
 
     def _read_meta(self) -> EpisodeMeta:
@@ -240,16 +272,18 @@ class EpisodeReader:
         return tuple(kinds), times
 
     def _message(self, topic: str, index: int, read: Callable[[memoryview], _Value]) -> _Value:
+        self._require(index)
+        return self._at(topic, self._entries[topic][index].tolist(), read)
+
+    def _require(self, index: int) -> None:
         if not 0 <= index < len(self):
             raise NoSuchFrame(self.path, index, len(self))
-        return self._at(topic, self._entries[topic][index].tolist(), read)
 
     def _beside(
         self, topic: str, index: int, read: Callable[[memoryview], _Value]
     ) -> _Value | None:
         """Return the value at a frame of a topic that frames need not have."""
-        if not 0 <= index < len(self):
-            raise NoSuchFrame(self.path, index, len(self))
+        self._require(index)
         stamps = self._entries[FRAME][: len(self), 0]
         there = self._images[topic]
         there = there[there[:, 0] == stamps[index]]

@@ -1,11 +1,10 @@
 """Why an MCAP file is refused as an episode, and what can be done about it."""
 
-from pathlib import Path
-
 from dnet.errors import BadEpisode
+from dnet.types import Place
 
 
-def cut_off(path: Path) -> BadEpisode:
+def cut_off(path: Place) -> BadEpisode:
     """Return the refusal of a file without an end."""
     return BadEpisode(
         path,
@@ -15,15 +14,15 @@ def cut_off(path: Path) -> BadEpisode:
     )
 
 
-def damaged(path: Path, why: str) -> BadEpisode:
+def damaged(path: Place, why: str) -> BadEpisode:
     """Return the refusal of a file whose parts contradict each other."""
     return BadEpisode(path, f"is damaged: {why}", f"record it again, or try {_recover(path)}")
 
 
-def unindexed(path: Path) -> BadEpisode:
+def unindexed(path: Place) -> BadEpisode:
     """Return the refusal of a file that can only be read from front to back."""
     return BadEpisode(path, "has no message index", f"rewrite it with {_recover(path)}")
 
 
-def _recover(path: Path) -> str:
-    return f"the official MCAP tool (`mcap recover {path} -o whole.mcap`)"
+def _recover(path: Place) -> str:
+    return f"`dnet inspect repair {path}`"

@@ -2,10 +2,10 @@
 
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from pathlib import Path
 from typing import NamedTuple
 
 from mcap.data_stream import ReadDataStream
@@ -14,19 +14,29 @@ from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Channel, MetadataIndex, Statistics
 
 from dnet.datasets.refusals import cut_off, damaged, unindexed
+from dnet.datasets.sources import Source
+from dnet.types import Place
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD = struct.Struct("<BQ")
 """How every record begins: opcode and length."""
 UNREADABLE = (struct.error, ValueError, IndexError, OverflowError, McapError)
 """What parsers raise on bytes that are not what they claim to be."""
+MOST_NAMES = 4096
+"""Channels, attachments or metadata of a file that are still read, each: dnet writes 13 channels."""
 
 _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_INDEX = struct.Struct("<QQQQI")
 _OFFSET = struct.Struct("<HQ")
+_CRC = struct.Struct("<I")
+_NAMED: dict[int, str] = {
+    Opcode.CHANNEL: "channels",
+    Opcode.ATTACHMENT_INDEX: "attachments",
+    Opcode.METADATA_INDEX: "metadata records",
+}
 
 
-class Place(NamedTuple):
+class Extent(NamedTuple):
     """Where a record lies in the file."""
 
     offset: int
@@ -50,43 +60,49 @@ class Summary:
     """Channel by topic."""
     chunks: list[ChunkPlace] = field(default_factory=list)
     """In file order; they do not overlap."""
-    metadata: dict[str, Place] = field(default_factory=dict)
-    attachments: dict[str, Place] = field(default_factory=dict)
+    metadata: dict[str, Extent] = field(default_factory=dict)
+    attachments: dict[str, Extent] = field(default_factory=dict)
     messages: int = 0
 
 
-def read_summary(path: Path, content: memoryview) -> Summary:
-    """Return the summary of the MCAP file that `content` is.
+def read_summary(name: Place, source: Source) -> Summary:
+    """Return the summary of an MCAP file.
 
     Args:
-        path: Its name, for errors.
-        content: All of its bytes.
+        name: Its path or URL, for errors.
+        source: Its bytes, of which only the last are read.
 
     Raises:
         BadEpisode: If the file is cut off, has no index, or is damaged.
     """
-    end = len(content) - len(MAGIC)
+    size = len(source)
+    end = size - len(MAGIC)
     footer = end - _FOOTER.size
-    if footer < len(MAGIC) or content[end:] != MAGIC:
-        raise cut_off(path)
-    opcode, length, start, _, crc = _FOOTER.unpack_from(content, footer)
+    if footer < len(MAGIC) or source.view(end, size) != MAGIC:
+        raise cut_off(name)
+    opcode, length, start, _, crc = _FOOTER.unpack(source.view(footer, end))
     if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD.size:
-        raise cut_off(path)
+        raise cut_off(name)
     if not len(MAGIC) <= start <= footer:
-        raise unindexed(path)
+        raise unindexed(name)
+    content = source.view(start, end)
     # The checksum covers the summary and the footer up to the checksum itself.
-    if crc and zlib.crc32(content[start : end - 4]) != crc:
-        raise damaged(path, "its summary fails its checksum")
+    if crc and zlib.crc32(content[: -_CRC.size]) != crc:
+        raise damaged(name, "its summary fails its checksum")
     summary = Summary()
     try:
-        for kind, record in _records(content[start:footer]):
+        seen = Counter[int]()
+        for kind, record in _records(content[: footer - start]):
+            seen[kind] += 1
+            if kind in _NAMED and seen[kind] > MOST_NAMES:
+                raise ValueError(f"more than {MOST_NAMES} {_NAMED[kind]}")
             _take(summary, kind, record)
     except UNREADABLE as error:
-        raise damaged(path, f"its summary is unreadable ({error})") from error
+        raise damaged(name, f"its summary is unreadable ({error})") from error
     summary.chunks.sort(key=lambda chunk: chunk.offset)
-    _refuse_overlaps(path, summary, footer)
+    _refuse_overlaps(name, summary, footer)
     if summary.messages and not any(chunk.indexes for chunk in summary.chunks):
-        raise unindexed(path)
+        raise unindexed(name)
     return summary
 
 
@@ -116,10 +132,10 @@ def _take(summary: Summary, opcode: int, record: memoryview) -> None:
         summary.messages = Statistics.read(parse(record)).message_count
     elif opcode == Opcode.METADATA_INDEX:
         metadata = MetadataIndex.read(parse(record))
-        summary.metadata[metadata.name] = Place(metadata.offset, metadata.length)
+        summary.metadata[metadata.name] = Extent(metadata.offset, metadata.length)
     elif opcode == Opcode.ATTACHMENT_INDEX:
         attachment = AttachmentIndex.read(parse(record))
-        summary.attachments[attachment.name] = Place(attachment.offset, attachment.length)
+        summary.attachments[attachment.name] = Extent(attachment.offset, attachment.length)
 
 
 def _chunk_place(record: memoryview) -> ChunkPlace:
@@ -130,10 +146,10 @@ def _chunk_place(record: memoryview) -> ChunkPlace:
     return ChunkPlace(offset, length, dict(_OFFSET.iter_unpack(record[start : start + size])))
 
 
-def _refuse_overlaps(path: Path, summary: Summary, end: int) -> None:
+def _refuse_overlaps(name: Place, summary: Summary, end: int) -> None:
     # Chunks that share bytes would let a small file claim any number of messages.
     place = len(MAGIC)
     for chunk in summary.chunks:
         if chunk.offset < place or chunk.length > end - chunk.offset:
-            raise damaged(path, "its chunks overlap or lie outside the file")
+            raise damaged(name, "its chunks overlap or lie outside the file")
         place = chunk.offset + chunk.length

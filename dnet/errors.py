@@ -54,14 +54,14 @@ class TooFew(DnetError, ValueError):
 class MissingPath(DnetError, FileNotFoundError):
     """A file or directory that is not there."""
 
-    def __init__(self, path: Path, what: str, hint: str) -> None:
+    def __init__(self, path: Path | str, what: str, hint: str) -> None:
         super().__init__(f"{what} {path} does not exist; {hint}")
 
 
 class NoEpisodes(DnetError, FileNotFoundError):
     """A directory without a single finished episode."""
 
-    def __init__(self, path: Path, why: str = "holds no .mcap episode") -> None:
+    def __init__(self, path: Path | str, why: str = "holds no .mcap episode") -> None:
         super().__init__(f"{path} {why}; record some with `dnet record {path}`")
 
 
@@ -77,14 +77,14 @@ class OccupiedOutput(DnetError, FileExistsError):
 class BadEpisode(DnetError, ValueError):
     """A file that is not an episode, or not a whole one."""
 
-    def __init__(self, path: Path, why: str, hint: str) -> None:
+    def __init__(self, path: Path | str, why: str, hint: str) -> None:
         super().__init__(f"{path} {why}; {hint}")
 
 
 class NoSuchFrame(DnetError, IndexError):
     """A frame number beyond the end of an episode."""
 
-    def __init__(self, path: Path, frame: int, count: int) -> None:
+    def __init__(self, path: Path | str, frame: int, count: int) -> None:
         super().__init__(
             f"{path} has no frame {frame}: it has {count} frames, 0 to {count - 1}; "
             f"`dnet inspect info {path}` lists them"
@@ -356,6 +356,36 @@ class StoreFailed(DnetError, OSError):
         )
 
 
+class Unfetched(DnetError, OSError):
+    """A file in a store that cannot be read."""
+
+    def __init__(self, url: str, why: str) -> None:
+        super().__init__(
+            f"{url} cannot be read: {why}; see that the store answers, that the file is there, "
+            "and that you may read it"
+        )
+
+
+class ChangedEpisode(DnetError, RuntimeError):
+    """A file that is not the one that was indexed."""
+
+    def __init__(self, path: Path | str) -> None:
+        super().__init__(
+            f"{path} has changed since it was indexed; run the same call again, which brings the "
+            "index up to date"
+        )
+
+
+class OtherStream(DnetError, ValueError):
+    """A state of a loader that is not of this loader."""
+
+    def __init__(self, what: str, got: object, want: object) -> None:
+        super().__init__(
+            f"the loader's {what} is {got}, that of the state to go on from is {want}; go on with "
+            "the same data, seed and division, or begin anew"
+        )
+
+
 class OtherWorker(DnetError, RuntimeError):
     """A process that would not record what was asked for, or not where."""
 
@@ -383,4 +413,58 @@ class ClusterFailed(DnetError, RuntimeError):
         super().__init__(
             f"the Ray cluster at {address} failed: {why}; every node needs the same dnet; "
             "finished episodes are kept, the same call goes on"
+        )
+
+
+class BrokenRecord(DnetError, ValueError):
+    """A file that cannot be read any further from its front."""
+
+    def __init__(self, path: Path, byte: int, why: str) -> None:
+        super().__init__(
+            f"{path} is broken at byte {byte}: {why}; `dnet inspect repair {path}` saves the whole "
+            "frames before it"
+        )
+        self.byte = byte
+        self.why = why
+
+
+class SharedFolder(DnetError, ValueError):
+    """Copies that would lie among the originals."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(
+            f"{folder} holds the files to be repaired, which stay as they are; "
+            "choose another directory for what is saved of them"
+        )
+
+
+class Unwritten(DnetError, OSError):
+    """A folder that takes no file."""
+
+    def __init__(self, folder: Path, why: str) -> None:
+        super().__init__(
+            f"nothing can be written into {folder}: {why}; make room, or choose another directory; "
+            "the originals are as they were"
+        )
+
+
+class NothingSaved(DnetError, ValueError):
+    """Broken files that hold no whole frame."""
+
+    def __init__(self, names: list[str], files: int) -> None:
+        shown = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
+        super().__init__(
+            f"nothing could be saved of {len(names)} of {files} files ({shown}); "
+            "they are kept, record them again"
+        )
+
+
+class FaultyEpisodes(DnetError, ValueError):
+    """Episodes of which a validation found something wrong."""
+
+    def __init__(self, errors: int, warnings: int, episodes: int) -> None:
+        super().__init__(
+            f"{errors} errors and {warnings} warnings in {episodes} episodes; move the files with "
+            "errors elsewhere and record them again, or save the whole frames of a damaged one "
+            "with the official MCAP tool (`mcap recover`)"
         )

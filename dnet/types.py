@@ -7,6 +7,7 @@ lies on the table top under the nominal centre of the object, z up; the holding 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ Point = Float64[np.ndarray, "3"]
 Pose = Float64[np.ndarray, "4 4"]
 Joints = Float64[np.ndarray, "6"]
 JointPath = Float64[np.ndarray, "_ 6"]
+
+Place = Path | str
+"""Where a file or a folder is: a path of this machine, or a URL of a store that fsspec knows."""
 
 FrameKind = Literal["rest", "shape", "way"]
 """`rest`: after the grasp, before any motion; `shape`: settled; `way`: seen on the way."""

@@ -16,7 +16,7 @@ from dnet.recorders.blueprint import (
     servo_blueprint,
 )
 from dnet.recorders.rerun_scene import CHAMFER, RerunScene
-from dnet.types import Cloud, EpisodeMeta, Frame, Transform
+from dnet.types import Cloud, EpisodeMeta, Frame, Place, Transform
 
 URDF = "psm.urdf"
 
@@ -25,8 +25,12 @@ URDF = "psm.urdf"
 class RecordedEpisode(Protocol):
     """What a replay asks of an episode that is being read."""
 
-    path: Path
     meta: EpisodeMeta
+
+    @property
+    def path(self) -> Place:
+        """Where it came from, for errors."""
+        ...
 
     @property
     def attachments(self) -> tuple[str, ...]:

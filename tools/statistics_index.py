@@ -85,9 +85,9 @@ def read_index(
             with EpisodeReader(path) as episode:
                 if episode.finished:
                     # First what can fail: half an episode must not count.
-                    frames.append(_frames(episode))
-                    episodes.append(_row(episode))
-                    rejected += _rejected(episode)
+                    frames.append(_frames(episode, path.name))
+                    episodes.append(_row(episode, path))
+                    rejected += _rejected(episode, path.name)
                 else:
                     unfinished += 1
         except BadEpisode:
@@ -109,13 +109,13 @@ def read_index(
     )
 
 
-def _row(episode: EpisodeReader) -> tuple[Any, ...]:
+def _row(episode: EpisodeReader, path: Path) -> tuple[Any, ...]:
     scene = episode.meta.scene
     offset = np.array(scene.manipulation_point) - np.array([*scene.position, 0.0])
     deviation = _mapping(episode, "deviation_mm")
     return (
-        episode.path.name,
-        episode.path.stat().st_size,
+        path.name,
+        path.stat().st_size,
         float(episode.times[-1] - episode.times[0]) if len(episode) else 0.0,
         scene.tissue.shape,
         *(1e3 * edge for edge in scene.tissue.size),
@@ -127,13 +127,13 @@ def _row(episode: EpisodeReader) -> tuple[Any, ...]:
     )
 
 
-def _frames(episode: EpisodeReader) -> pl.DataFrame:
+def _frames(episode: EpisodeReader, name: str) -> pl.DataFrame:
     grasps = episode.grasps
     if not np.isfinite(grasps).all():
         raise BadEpisode(episode.path, "has a grasp of NaN or infinity", "record it again")
     moved = 1e3 * (grasps - grasps[:1])
     columns = {
-        "episode": [episode.path.name] * len(episode),
+        "episode": [name] * len(episode),
         "kind": list(episode.kinds),
         "points": [len(episode.cloud(index)) for index in range(len(episode))],
         **{axis: moved[:, column] for column, axis in enumerate("xyz")},
@@ -141,13 +141,9 @@ def _frames(episode: EpisodeReader) -> pl.DataFrame:
     return pl.DataFrame(columns, schema=_FRAMES)
 
 
-def _rejected(episode: EpisodeReader) -> list[tuple[str, str, int]]:
+def _rejected(episode: EpisodeReader, name: str) -> list[tuple[str, str, int]]:
     reasons = _mapping(episode, "rejected") or {}
-    return [
-        (episode.path.name, reason, count)
-        for reason, count in reasons.items()
-        if isinstance(count, int)
-    ]
+    return [(name, reason, count) for reason, count in reasons.items() if isinstance(count, int)]
 
 
 def _mapping(episode: EpisodeReader, key: str) -> Mapping[str, Any] | None:

@@ -9,11 +9,10 @@ from tempfile import TemporaryDirectory, gettempdir
 from time import sleep
 from typing import Any, TypeVar
 
-from fsspec.core import url_to_fs
+from dnet.datasets.sources import said
+from dnet.datasets.stores import S3, file_system
+from dnet.errors import NoSpace, StoreFailed, UnknownStore
 
-from dnet.errors import MissingExtra, NoSpace, StoreFailed, UnknownStore
-
-S3 = ("s3", "s3a")
 BUCKETS = (*S3, "gs", "gcs", "abfs", "abfss", "az")
 """Stores in which a folder is but the beginning of a name; to make one could make a bucket."""
 LASTING = (FileNotFoundError, PermissionError, NotImplementedError)
@@ -87,7 +86,7 @@ class RemoteStore:
         except FileNotFoundError:
             return {}
         except Exception as error:
-            raise StoreFailed(self.name, _said(error)) from error
+            raise StoreFailed(self.name, said(error)) from error
         return {Path(one["name"]).name: one["size"] for one in found if one["type"] == "file"}
 
     def read(self, name: str) -> bytes:
@@ -100,7 +99,7 @@ class RemoteStore:
         try:
             content: bytes = files.cat_file(f"{path}/{name}")
         except Exception as error:
-            raise StoreFailed(self.name, _said(error)) from error
+            raise StoreFailed(self.name, said(error)) from error
         return content
 
     def write(self, name: str, content: bytes) -> None:
@@ -163,15 +162,7 @@ class RemoteStore:
     @property
     def _place(self) -> tuple[Any, str]:
         """The store's fsspec file system, which fsspec keeps for each process, and our path."""
-        try:
-            found: tuple[Any, str] = url_to_fs(self.name)
-        except ImportError as error:
-            if self.name.partition("://")[0] in S3:
-                raise MissingExtra("s3fs", "s3", f"writing to {self.name}") from error
-            raise UnknownStore(self.name, str(error)) from error
-        except ValueError as error:
-            raise UnknownStore(self.name, str(error)) from error
-        return found
+        return file_system(self.name, doing="writing to")
 
     def _insist(self, action: Callable[[], _Value]) -> _Value:
         """Do what may fail for a while, again after each pause."""
@@ -183,9 +174,5 @@ class RemoteStore:
             except Exception as error:
                 pause = None if isinstance(error, LASTING) else next(pauses, None)
                 if pause is None:
-                    raise StoreFailed(self.name, _said(error)) from error
+                    raise StoreFailed(self.name, said(error)) from error
             sleep(pause)
-
-
-def _said(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -151,7 +151,7 @@ def test_a_file_cut_anywhere_says_that_it_is_cut(
     cut = tmp_path / "cut.mcap"
     for length in (*range(8, len(whole), 17), len(whole) - 1):
         cut.write_bytes(whole[:length])
-        with pytest.raises(BadEpisode, match=r"cut off in the middle.*`mcap recover"):
+        with pytest.raises(BadEpisode, match=r"cut off in the middle.*`dnet inspect repair"):
             McapFile(cut)
 
 
