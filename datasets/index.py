@@ -1,0 +1,208 @@
+"""The index of a dataset: a row a file and a row a frame, kept beside the logs and up to date.
+
+`index.parquet` holds the frames and `index-files.parquet` the files. Both can be thrown away: they
+are made from the logs, and made anew where they are missing, stale, or of another version.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
+from multiprocessing import get_context
+from pathlib import Path
+
+import polars as pl
+from polars.exceptions import PolarsError
+
+from dnet.datasets.index_rows import FILE_COLUMNS, FRAME_COLUMNS, FileRows, read_rows
+from dnet.datasets.listing import Listed, list_logs
+from dnet.datasets.sources import said
+from dnet.datasets.stores import as_place, file_system, is_url, join
+from dnet.errors import NoEpisodes, Unfetched
+from dnet.types import Place
+
+VERSION = "1"
+"""Of what the tables hold: an index of another version is made anew."""
+FRAMES, FILES = "index.parquet", "index-files.parquet"
+FILES_A_PROCESS = 64
+"""New files that are worth the start of one more process."""
+REQUESTS = 16
+"""Files of a store that are fetched at a time."""
+
+_STAMP = {"dnet.index": VERSION}
+
+
+@dataclass(frozen=True)
+class Index:
+    """All that is known of a dataset without its clouds."""
+
+    root: Place
+    files: pl.DataFrame
+    """A row a file, sorted by name; columns as in `FILE_COLUMNS`."""
+    frames: pl.DataFrame
+    """A row a frame, in the order of the files; columns as in `FRAME_COLUMNS`."""
+
+    def path(self, name: str) -> Place:
+        """Return where a file of the dataset is."""
+        return join(self.root, name)
+
+    def broken(self) -> pl.DataFrame:
+        """Return the files of which nothing can be read."""
+        return self.files.filter(pl.col("note") != "")
+
+
+def open_index(
+    root: Place,
+    *,
+    workers: int | None = None,
+    on_file: Callable[[int, int], None] = lambda _done, _total: None,
+) -> Index:
+    """Return the index of the logs in a folder or under a URL, brought up to date.
+
+    Only new and changed files are read. The index is written back where that is possible; a
+    folder that cannot be written to is indexed all the same.
+
+    Args:
+        root: With `.mcap` files; `.part` files, recordings that run or were killed, don't count.
+        workers: Processes to read with, or requests at a time for a URL; None for a good number.
+        on_file: Called with the number of files read and of all that must be.
+
+    Raises:
+        MissingPath: If there is no such folder.
+        NoEpisodes: If it holds no `.mcap` file.
+        Unfetched: If a store does not answer.
+    """
+    root = as_place(root)
+    listed = list_logs(root)
+    if not listed:
+        raise NoEpisodes(root)
+    stored = _load(root)
+    kept = _unchanged(stored, listed)
+    wanted = [one for one in listed if one.name not in kept]
+    if stored is not None and not wanted and len(kept) == stored.files.height:
+        return stored
+    read = list(_read(root, wanted, workers, on_file))
+    index = _merged(root, stored, kept, read)
+    _store(index)
+    return index
+
+
+def _unchanged(stored: Index | None, listed: Sequence[Listed]) -> set[str]:
+    """Return the names of the files that are what they were when they were indexed."""
+    if stored is None:
+        return set()
+    known = set(stored.files.select("name", "version").iter_rows())
+    return {one.name for one in listed if (one.name, one.version) in known}
+
+
+def _read(
+    root: Place,
+    wanted: Sequence[Listed],
+    workers: int | None,
+    on_file: Callable[[int, int], None],
+) -> Iterator[FileRows]:
+    count = _workers(root, len(wanted)) if workers is None else workers
+    if count <= 1:
+        for done, one in enumerate(wanted, start=1):
+            yield _rows(root, one)
+            on_file(done, len(wanted))
+        return
+    with _executor(root, count) as executor:
+        found = executor.map(partial(_rows, root), wanted)
+        for done, rows in enumerate(found, start=1):
+            yield rows
+            on_file(done, len(wanted))
+
+
+def _workers(root: Place, files: int) -> int:
+    if is_url(root):
+        return min(REQUESTS, files)
+    return min(os.cpu_count() or 1, files // FILES_A_PROCESS)
+
+
+def _executor(root: Place, count: int) -> Executor:
+    if is_url(root):
+        return ThreadPoolExecutor(count)
+    # A fork of a process with threads may hang.
+    return ProcessPoolExecutor(count, mp_context=get_context("spawn"))
+
+
+def _rows(root: Place, one: Listed) -> FileRows:
+    return read_rows(root, one.name, version=one.version, size=one.size)
+
+
+def _merged(root: Place, stored: Index | None, kept: set[str], read: Sequence[FileRows]) -> Index:
+    files = [pl.DataFrame([rows.file for rows in read], schema=FILE_COLUMNS, orient="row")]
+    frames = [rows.frames for rows in read]
+    if stored is not None:
+        files.append(stored.files.filter(pl.col("name").is_in(kept)))
+        frames.append(stored.frames.filter(pl.col("name").is_in(kept)))
+    return Index(
+        root,
+        pl.concat(files).sort("name"),
+        pl.concat(frames).sort("name", "frame", maintain_order=True),
+    )
+
+
+def _load(root: Place) -> Index | None:
+    """Return the index as it was stored, None if there is none that can be used."""
+    try:
+        contents = {name: _content(root, name) for name in (FILES, FRAMES)}
+        for content in contents.values():
+            if pl.read_parquet_metadata(BytesIO(content)).get("dnet.index") != VERSION:
+                return None
+        files, frames = (pl.read_parquet(BytesIO(contents[name])) for name in (FILES, FRAMES))
+    except (OSError, PolarsError, Unfetched):
+        return None
+    if dict(files.schema) != _schema(FILE_COLUMNS) or dict(frames.schema) != _schema(FRAME_COLUMNS):
+        return None
+    # Two tables that were written by two processes at a time need not go together.
+    counted = frames.group_by("name").len("frames").sort("name")
+    told = files.filter(pl.col("frames") > 0).select("name", pl.col("frames").cast(pl.UInt32))
+    return Index(root, files, frames) if counted.equals(told.sort("name")) else None
+
+
+def _schema(columns: dict[str, object]) -> dict[str, object]:
+    return dict(pl.Schema(columns))  # type: ignore[arg-type]
+
+
+def _content(root: Place, name: str) -> bytes:
+    if not is_url(root):
+        return (Path(root) / name).read_bytes()
+    files, path = file_system(str(root), doing="reading")
+    try:
+        content: bytes = files.cat_file(f"{path}/{name}")
+    # Stores raise what they like.
+    except Exception as error:
+        raise Unfetched(str(join(root, name)), said(error)) from error
+    return content
+
+
+def _store(index: Index) -> None:
+    """Write both tables where that is possible."""
+    # An index that cannot be kept costs time, and nothing else.
+    with suppress(OSError):
+        for name, table in ((FRAMES, index.frames), (FILES, index.files)):
+            content = BytesIO()
+            table.write_parquet(content, metadata=_STAMP)
+            _put(index.root, name, content.getvalue())
+
+
+def _put(root: Place, name: str, content: bytes) -> None:
+    if is_url(root):
+        files, path = file_system(str(root), doing="writing to")
+        try:
+            files.pipe_file(f"{path}/{name}", content)
+        except Exception as error:
+            raise OSError(said(error)) from error
+        return
+    # Two processes may do this at a time: each writes a file of its own.
+    part = Path(root) / f".{name}.{os.getpid()}.part"
+    try:
+        part.write_bytes(content)
+        part.replace(Path(root) / name)
+    finally:
+        part.unlink(missing_ok=True)
