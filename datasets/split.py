@@ -3,6 +3,9 @@
 import hashlib
 from collections.abc import Sequence
 
+import numpy as np
+
+from dnet.datasets.frame_table import FrameTable
 from dnet.errors import NotAFraction
 
 
@@ -33,6 +36,35 @@ def split(
         held_out.discard(max(places, key=lambda name: places[name]))
     train = tuple(name for name in episode_ids if name not in held_out)
     return train, tuple(name for name in episode_ids if name in held_out)
+
+
+def split_frames(
+    table: FrameTable, *, fraction: float, seed: int = 0
+) -> tuple[FrameTable, FrameTable]:
+    """Return the frames to train on and those to validate on, parted shape by shape.
+
+    This is how the paper parts its samples: a network is judged by unseen shapes of objects and
+    grasps that it has seen. A shape's side depends on the hash of its episode and number alone;
+    rest frames, with which every sample of the paper begins, are on both sides.
+
+    Args:
+        table: All frames.
+        fraction: How many of the shapes to validate on, from 0 to 1.
+        seed: Another seed, another split.
+
+    Raises:
+        NotAFraction: If `fraction` is not between 0 and 1.
+    """
+    if not 0 <= fraction <= 1:
+        raise NotAFraction("validation fraction", fraction)
+    places = np.array(
+        [
+            _place(f"{table.episodes[file]}:{frame}", seed)
+            for file, frame in zip(table.file.tolist(), table.frame.tolist(), strict=True)
+        ]
+    )
+    held_out = places < fraction
+    return table.where(table.rest | ~held_out), table.where(table.rest | held_out)
 
 
 def _place(name: str, seed: int) -> float:

@@ -1,0 +1,121 @@
+"""Groups for training on all pairs: some clouds of one episode, each to be encoded once."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from jaxtyping import Float32, Int64
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from dnet.datasets.batch_order import Drawn
+from dnet.datasets.clouds import Clouds
+from dnet.datasets.pairs import Rows
+from dnet.datasets.permutation import Permutation
+from dnet.errors import TooFew
+
+
+@dataclass(frozen=True, slots=True)
+class GroupBatch:
+    """Clouds of some groups, and all ordered pairs within each group.
+
+    G groups of m clouds are G m (m - 1) pairs for the price of G m encodings.
+    """
+
+    clouds: Float32[Tensor, "k n 3"]
+    grasps: Float32[Tensor, "k 3"]
+    """The manipulation point of each cloud, in metres."""
+    groups: Int64[Tensor, " k"]
+    """Which group of the batch each cloud is in, from 0."""
+    current: Int64[Tensor, " p"]
+    """Of each pair: which of the clouds is the current one."""
+    goal: Int64[Tensor, " p"]
+    """Of each pair: which of the clouds is the goal."""
+    rows: Int64[Tensor, " k"]
+    """Which frames of the table the clouds are."""
+
+    def __len__(self) -> int:
+        return len(self.clouds)
+
+    def pin_memory(self) -> "GroupBatch":
+        """Return the batch in memory from which a GPU reads fastest."""
+        parts = (self.clouds, self.grasps, self.groups, self.current, self.goal, self.rows)
+        return GroupBatch(*(part.pin_memory() for part in parts))
+
+
+@dataclass(frozen=True)
+class Dealt:
+    """The frames of each episode, shuffled anew for every epoch and dealt into groups."""
+
+    lengths: tuple[int, ...]
+    """Frames of each episode; one with fewer than two has no group."""
+    size: int
+    """The least frames of a group, except in an episode with fewer; at least two."""
+    seed: int = 0
+    _starts: Rows = field(init=False, repr=False)
+    _ends: Rows = field(init=False, repr=False)
+    """Number of the group after the last of each episode."""
+
+    def __post_init__(self) -> None:
+        """Count the groups.
+
+        Raises:
+            TooFew: If groups are to have fewer than two frames, or there is none.
+        """
+        if self.size < 2:
+            raise TooFew("number of frames in a group", self.size, 2)
+        lengths = np.asarray(self.lengths, dtype=np.int64)
+        counts = np.where(lengths < 2, 0, np.maximum(1, lengths // self.size))
+        object.__setattr__(self, "_starts", np.cumsum(lengths) - lengths)
+        object.__setattr__(self, "_ends", np.cumsum(counts))
+        if not len(self):
+            raise TooFew("number of episodes with two settled frames", 0, 1)
+
+    def __len__(self) -> int:
+        return int(self._ends[-1]) if len(self._ends) else 0
+
+    def rows(self, number: int, *, epoch: int) -> Rows:
+        """Return the frames of a group in an epoch."""
+        episode = int(np.searchsorted(self._ends, number, side="right"))
+        length, before = self.lengths[episode], int(self._ends[episode - 1]) if episode else 0
+        count, place = int(self._ends[episode]) - before, number - before
+        # As evenly as it goes, the first groups one frame longer: as numpy splits an array.
+        start, stop = (
+            one * (length // count) + min(one, length % count) for one in (place, place + 1)
+        )
+        order = Permutation(length, seed=(self.seed, epoch, episode))
+        return self._starts[episode] + order.part(start, stop)
+
+
+class Groups(Dataset[GroupBatch]):
+    """The groups of a dataset, by batches that a `BatchOrder` draws.
+
+    Args:
+        clouds: Of the frames of a table.
+        size: The least clouds of a group, except in an episode with fewer; at least two.
+        seed: Of who meets whom.
+    """
+
+    def __init__(self, clouds: Clouds, *, size: int = 5, seed: int = 0) -> None:
+        self.clouds = clouds
+        self.dealt = Dealt(tuple(clouds.table.lengths.tolist()), size, seed)
+
+    def __len__(self) -> int:
+        return len(self.dealt)
+
+    def __getitem__(self, drawn: Drawn) -> GroupBatch:
+        """Return a batch of groups."""
+        groups = [self.dealt.rows(number, epoch=drawn.epoch) for number in drawn.numbers.tolist()]
+        sizes = np.array([len(group) for group in groups])
+        rows, numbers = np.concatenate(groups), np.repeat(np.arange(len(groups)), sizes)
+        # All pairs of the batch, those within one group.
+        same = numbers[:, None] == numbers
+        current, goal = np.nonzero(same & ~np.eye(len(rows), dtype=bool))
+        grasps = self.clouds.table.grasps[rows].astype(np.float32)
+        arrays = (self.clouds.stack(rows), grasps, numbers, current, goal, rows)
+        return GroupBatch(*(torch.from_numpy(array) for array in arrays))
+
+    @property
+    def fingerprint(self) -> str:
+        """What changes when one of the files does, or other frames are taken."""
+        return f"{self.clouds.table.fingerprint}-{self.dealt.size}-{self.dealt.seed}"
