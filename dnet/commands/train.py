@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from dnet.training.frames import Frames
     from dnet.training.loop import Result, TrainingSettings
     from dnet.training.run import RunWriter
+    from dnet.types import Place
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Train:
         """
         from rich.console import Console
 
+        from dnet.commands.index_bar import read_index
         from dnet.commands.training_screen import error_table, show_data
         from dnet.nets.deformernet import DeformerNetConfig
         from dnet.training.allocation import keep_pages
@@ -71,11 +73,14 @@ class Train:
 
         self._check()
         settings, device, console = self._settings(), self._device(), Console(stderr=True)
-        division = divide(self.from_mcap, fraction=self.validation, seed=self.seed)
+        index = read_index(self.from_mcap, console)
+        division = divide(index, fraction=self.validation, seed=self.seed)
         config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.points)
         writer = RunWriter(self.out, self._describe(division, config, settings))
         keep_pages()
-        training, validation = _read(division, config, seed=self.seed, console=console)
+        training, validation = _read(
+            division, config, root=index.root, seed=self.seed, console=console
+        )
         model = new_network(config, seed=self.seed).to(device)
         show_data(console, division, training)
         result = self._fit(
@@ -174,13 +179,21 @@ class Train:
 
 
 def _read(
-    division: "Division", config: "DeformerNetConfig", *, seed: int, console: "Console"
+    division: "Division",
+    config: "DeformerNetConfig",
+    *,
+    root: "Place",
+    seed: int,
+    console: "Console",
 ) -> "tuple[Frames, Frames]":
     """Return the training and the validation frames, with a progress bar."""
     from dnet.commands.progress import progress
     from dnet.training.episodes import open_each
     from dnet.training.frames import read_frames, samplings_for
+    from dnet.training.neighbour_tables import KeptNeighbourhoods
 
+    surveys = (*division.training, *division.validation)
+    find = KeptNeighbourhoods(root, {survey.path: survey.digest for survey in surveys})
     learned, judged = (
         sum(survey.frames for survey in part) for part in (division.training, division.validation)
     )
@@ -195,9 +208,11 @@ def _read(
             config,
             samplings=samplings_for(learned),
             seed=seed,
+            find=find,
             on_cloud=advance,
         )
-        return training, read_frames(open_each(division.validation), config, on_cloud=advance)
+        judged_by = open_each(division.validation)
+        return training, read_frames(judged_by, config, find=find, on_cloud=advance)
 
 
 def _closing_line(result: "Result", out: Path) -> str:

@@ -178,5 +178,9 @@ def prepare(cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud") -> 
     bad = int((~np.isfinite(cloud).all(axis=1)).sum())
     if bad:
         raise BadCloud(what, bad, len(cloud))
-    scaled = (cloud / config.coordinate_unit).astype(np.float32)
-    return find_neighbourhoods(scaled, GROUPINGS[config.size])
+    return find_neighbourhoods(in_unit(cloud, config), GROUPINGS[config.size])
+
+
+def in_unit(cloud: Cloud, config: DeformerNetConfig) -> Cloud:
+    """Return a cloud in metres in the unit of a network of `config`."""
+    return (cloud / config.coordinate_unit).astype(np.float32)

@@ -2,23 +2,27 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from dnet.datasets.directory import find_episodes
+import polars as pl
+
+from dnet.datasets.frame_table import SETTLED
+from dnet.datasets.index import Index
 from dnet.datasets.reader import EpisodeReader
 from dnet.datasets.split import split
-from dnet.errors import TooFew
-from dnet.training.frames import settled
+from dnet.errors import BadEpisode, TooFew
+from dnet.types import Place
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
     """What is known of an episode without reading its clouds."""
 
-    path: Path
+    path: Place
     episode_id: str
     frames: int
     """Settled ones."""
+    digest: str
+    """SHA-256 of the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,41 +37,39 @@ class Division:
     """Points of the first cloud; all others must have as many."""
 
 
-def divide(directory: Path, *, fraction: float, seed: int) -> Division:
-    """Return which episodes of `directory` to learn from.
+def divide(index: Index, *, fraction: float, seed: int) -> Division:
+    """Return which episodes of a dataset to learn from.
 
     Args:
-        directory: With `.mcap` episodes.
+        index: Of the dataset.
         fraction: How much to validate on; both sides get at least one episode.
         seed: Another seed, another division.
 
     Raises:
-        MissingPath: If there is no such directory.
-        NoEpisodes: If it holds no episode.
-        BadEpisode: If one of its files is not an episode.
+        BadEpisode: If one of the files cannot be read.
         NotAFraction: If `fraction` is not between 0 and 1.
         TooFew: If fewer than two episodes have a pair of settled frames.
     """
-    found: list[Survey] = []
-    points = 0
-    skipped = 0
-    for path in find_episodes(directory):
-        with EpisodeReader(path) as episode:
-            frames = settled(episode.kinds)
-            if len(frames) < 2:
-                skipped += 1
-                continue
-            found.append(Survey(path, episode.meta.episode_id, len(frames)))
-            points = points or len(episode.cloud(frames[0]))
-    ids = {survey.episode_id for survey in found}
-    train_ids, _ = split(sorted(ids), fraction=fraction, seed=seed)
+    for name, note in index.broken().select("name", "note").iter_rows():
+        raise BadEpisode(index.path(name), note, "remove it, or record it again")
+    settled = index.frames.filter(pl.col("kind").is_in(SETTLED))
+    counted = settled.group_by("name").agg(pl.len().alias("settled"), pl.col("points").first())
+    paired = index.files.join(counted.filter(pl.col("settled") > 1), on="name").sort("name")
+    ids = paired["episode"].unique().sort().to_list()
+    train_ids, _ = split(ids, fraction=fraction, seed=seed)
     if len(ids) < 2:
-        raise TooFew(f"number of episodes in {directory} with two settled frames", len(ids), 2)
+        raise TooFew(f"number of episodes in {index.root} with two settled frames", len(ids), 2)
+    surveys = [
+        Survey(index.path(name), episode, count, digest)
+        for name, episode, count, digest in paired.select(
+            "name", "episode", "settled", "sha256"
+        ).iter_rows()
+    ]
     return Division(
-        tuple(survey for survey in found if survey.episode_id in train_ids),
-        tuple(survey for survey in found if survey.episode_id not in train_ids),
-        skipped,
-        points,
+        tuple(survey for survey in surveys if survey.episode_id in train_ids),
+        tuple(survey for survey in surveys if survey.episode_id not in train_ids),
+        index.files.height - paired.height,
+        int(paired["points"][0]),
     )
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -11,10 +10,11 @@ from jaxtyping import Bool, Float32, Int64
 from torch import Tensor
 
 from dnet.errors import BadEpisode, TooFew
-from dnet.nets.deformernet import DeformerNetConfig, prepare
+from dnet.nets.deformernet import DeformerNetConfig
 from dnet.nets.neighbourhoods import GROUPINGS, Neighbourhoods, regroup
 from dnet.training.batches import ordered_pairs
-from dnet.types import Frame, FrameKind, Point
+from dnet.training.neighbour_tables import FindNeighbourhoods, find_each
+from dnet.types import Frame, FrameKind, Place, Point
 
 MOST_SAMPLINGS = 8
 """Choices of centroids of a cloud; more of them cost time and teach little more."""
@@ -28,7 +28,7 @@ class EpisodeSource(Protocol):
     """What training asks of an episode; `dnet.datasets.reader.EpisodeReader` is one."""
 
     @property
-    def path(self) -> Path:
+    def path(self) -> Place:
         """Where it came from, for errors."""
         ...
 
@@ -103,6 +103,7 @@ def read_frames(
     *,
     samplings: int = 1,
     seed: int = 0,
+    find: FindNeighbourhoods = find_each,
     on_cloud: Callable[[], None] = lambda: None,
 ) -> Frames:
     """Read every settled frame of `episodes` and find its neighbourhoods.
@@ -116,6 +117,7 @@ def read_frames(
             care which points happen to be centroids; with few frames it learns that only from
             seeing the same cloud with others.
         seed: Of all choices of centroids but the usual one.
+        find: Finds the neighbourhoods of an episode's clouds, or has them already.
         on_cloud: Called after each cloud.
 
     Raises:
@@ -133,11 +135,12 @@ def read_frames(
         chosen = settled(episode.kinds)
         if len(chosen) < 2:
             continue
-        for index in chosen:
-            frame = episode.frame(index)
-            where = f"frame {index} of {episode.path}"
+        seen = [episode.frame(index) for index in chosen]
+        for frame in seen:
             _check_points(frame, config, path=episode.path)
-            cloud = prepare(frame.cloud, config, what=where)
+        usual = {index: frame.cloud for index, frame in zip(chosen, seen, strict=True)}
+        found = find(episode.path, usual, config)
+        for frame, cloud in zip(seen, found, strict=True):
             starts = rng.integers(config.points, size=samplings - 1).tolist()
             clouds.append((cloud, *(regroup(cloud, groupings, start=start) for start in starts)))
             grasps.append(frame.grasp)
@@ -154,7 +157,7 @@ def read_frames(
     )
 
 
-def _check_points(frame: Frame, config: DeformerNetConfig, *, path: Path) -> None:
+def _check_points(frame: Frame, config: DeformerNetConfig, *, path: Place) -> None:
     if len(frame.cloud) != config.points:
         raise BadEpisode(
             path,
