@@ -7,6 +7,7 @@ from typing import Annotated
 import tyro
 
 from dnet.commands.inspect_material import Material
+from dnet.commands.inspect_repair import Repair
 from dnet.commands.inspect_stats import Stats
 
 
@@ -73,6 +74,7 @@ class Inspect:
         Annotated[List, tyro.conf.subcommand("ls")]
         | Annotated[Info, tyro.conf.subcommand("info")]
         | Annotated[Stats, tyro.conf.subcommand("stats")]
+        | Annotated[Repair, tyro.conf.subcommand("repair")]
         | Annotated[Material, tyro.conf.subcommand("material")]
     ]
 
