@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, get_args
 
@@ -36,12 +36,14 @@ FILE_COLUMNS: dict[str, Any] = {
     "size_y": pl.Float64,
     "size_z": pl.Float64,
     "young": pl.Float64,
+    "scene": pl.String,
     "result": pl.String,
 }
 """Of the table of files: name, version (changes when the file does), bytes and SHA-256; note (why
 nothing can be read of it, else empty); id, seed and pair of the episode; its frames, settled
 shapes and seconds of simulation; whether the recording ended by itself; shape, size (m) and
-Young's modulus (Pa) of the object; what the recording said of itself at its end, as JSON."""
+Young's modulus (Pa) of the object; what the episode starts from and what the recording said of
+itself at its end, both as JSON."""
 
 FRAME_COLUMNS: dict[str, Any] = {
     "name": pl.String,
@@ -124,6 +126,7 @@ def _episode_row(episode: EpisodeReader) -> dict[str, Any]:
         "size_y": tissue.size[1],
         "size_z": tissue.size[2],
         "young": tissue.young,
+        "scene": json.dumps(asdict(meta.scene)),
         "result": None if episode.result is None else json.dumps(episode.result),
     }
 

@@ -19,6 +19,7 @@ from google.protobuf.message import DecodeError
 from jaxtyping import Float32, Float64, UInt8
 from scipy.spatial.transform import Rotation
 
+from dnet.datasets.point_cloud import NotFinite
 from dnet.geometry.pose import pose
 from dnet.types import (
     ARMS,
@@ -36,6 +37,11 @@ from dnet.types import (
 UNREADABLE = (ValueError, TypeError, KeyError, OverflowError, RecursionError, DecodeError)
 JOINTS_PER_ARM = 6
 WORLD = "world"
+LARGEST_MESSAGE = 64 * 1024
+"""Bytes of a message without points or pixels that are still parsed: dnet writes 5 KiB at most, and
+parsed ones take many times their bytes."""
+MOST_TRANSFORMS = 256
+"""Transforms of one message that are still read: dnet writes 23."""
 
 _KINDS = get_args(FrameKind)
 _SHAPES = get_args(TissueShape)
@@ -43,13 +49,21 @@ _SHAPES = get_args(TissueShape)
 
 def read_position(message: memoryview) -> Point:
     """Return the position of a foxglove.PoseInFrame."""
-    position = PoseInFrame.FromString(bytes(message)).pose.position
-    return np.array([position.x, position.y, position.z])
+    return read_placement(message)[0]
+
+
+def read_placement(message: memoryview) -> tuple[Point, Float64[np.ndarray, "4"]]:
+    """Return position and orientation, a quaternion x y z w, of a foxglove.PoseInFrame."""
+    placed = PoseInFrame.FromString(_small(message)).pose
+    return (
+        np.array([getattr(placed.position, axis) for axis in "xyz"]),
+        np.array([getattr(placed.orientation, axis) for axis in "xyzw"]),
+    )
 
 
 def read_joints(message: memoryview) -> tuple[Joints, Joints]:
     """Return the joint positions of both arms in a foxglove.JointStates."""
-    states = JointStates.FromString(bytes(message)).joints
+    states = JointStates.FromString(_small(message)).joints
     left, right = (
         np.array([joint.position for joint in states if joint.name.startswith(f"{arm}/")])
         for arm in ARMS
@@ -61,6 +75,9 @@ def read_joints(message: memoryview) -> tuple[Joints, Joints]:
 
 def read_transforms(message: memoryview) -> list[Transform]:
     """Return the transforms of a foxglove.FrameTransforms."""
+    entries = FrameTransforms.FromString(_small(message)).transforms
+    if len(entries) > MOST_TRANSFORMS:
+        raise ValueError(f"{len(entries)} transforms, at most {MOST_TRANSFORMS} are read")
     return [
         Transform(
             entry.parent_frame_id,
@@ -68,13 +85,13 @@ def read_transforms(message: memoryview) -> list[Transform]:
             np.array([getattr(entry.translation, axis) for axis in "xyz"]),
             np.array([getattr(entry.rotation, axis) for axis in "xyzw"]),
         )
-        for entry in FrameTransforms.FromString(bytes(message)).transforms
+        for entry in entries
     ]
 
 
 def read_calibration(message: memoryview) -> tuple[str, int, int, Float64[np.ndarray, "3 3"]]:
     """Return frame, width, height and the matrix K of a foxglove.CameraCalibration."""
-    calibration = CameraCalibration.FromString(bytes(message))
+    calibration = CameraCalibration.FromString(_small(message))
     if (
         len(calibration.K) != 9
         or not np.isfinite(calibration.K).all()
@@ -89,7 +106,7 @@ def read_depth(message: memoryview) -> Float32[np.ndarray, "h w"]:
     """Return the distances in a foxglove.RawImage of float32, read-only."""
     depth = _read_pixels(message, "32FC1", np.dtype("<f4"))
     if not np.isfinite(depth).all():
-        raise ValueError("a depth of NaN or infinity")
+        raise NotFinite("a depth of NaN or infinity")
     return depth
 
 
@@ -117,16 +134,16 @@ def read_line(message: memoryview) -> str:
 
 def read_frame_end(message: memoryview) -> tuple[int, FrameKind, float]:
     """Return number, kind and time of a frame: what a dnet.Frame says."""
-    record = json.loads(bytes(message))
+    record = json.loads(_small(message))
     kind = record["kind"]
     if kind not in _KINDS:
         raise ValueError(f"a frame of kind {str(kind)[:40]!r}, not one of {', '.join(_KINDS)}")
-    return int(record["index"]), kind, _finite(record["time"])
+    return _whole(record["index"]), kind, _finite(record["time"])
 
 
 def read_step(message: memoryview) -> dict[str, Any]:
     """Return a dnet.Step: index, time, chamfer, motion, plan or None."""
-    record: dict[str, Any] = dict(json.loads(bytes(message)))
+    record: dict[str, Any] = dict(json.loads(_small(message)))
     record["time"] = _finite(record["time"])
     record["chamfer"] = _finite(record["chamfer"])
     record["motion"] = list(_numbers(record["motion"], 3))
@@ -142,7 +159,7 @@ def read_meta(record: Mapping[str, str]) -> EpisodeMeta:
         index=int(record["index"]),
         scene=Scene(
             position=_numbers(scene["position"], 2),
-            yaw=float(scene["yaw"]),
+            yaw=_finite(scene["yaw"]),
             hold=_numbers(scene["hold"], 3),
             manipulation_point=_numbers(scene["manipulation_point"], 3),
             tissue=_read_tissue(scene["tissue"]),
@@ -180,12 +197,25 @@ def _read_pixels(message: memoryview, encoding: str, dtype: np.dtype[Any]) -> An
 
 def _numbers(values: Any, count: int) -> Any:
     if len(values) != count:
-        raise ValueError(f"{values} are not {count} numbers")
+        raise ValueError(f"{str(values)[:40]} are not {count} numbers")
     return tuple(_finite(value) for value in values)
 
 
 def _finite(value: Any) -> float:
     number = float(value)
     if not math.isfinite(number):
-        raise ValueError(f"{number} where a number must be")
+        raise NotFinite(f"{number} where a number must be")
     return number
+
+
+def _whole(value: Any) -> int:
+    # 1.5 would become 1, and true too.
+    if type(value) is not int:
+        raise TypeError(f"{str(value)[:40]!r} where a whole number must be")
+    return value
+
+
+def _small(message: memoryview) -> bytes:
+    if len(message) > LARGEST_MESSAGE:
+        raise ValueError(f"{len(message)} bytes, at most {LARGEST_MESSAGE} are read")
+    return bytes(message)

@@ -1,6 +1,6 @@
 """Tables of what was recorded: the episodes of a directory, the frames of an episode."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from dnet.datasets.directory import find_episodes, find_unfinished
+from dnet.datasets.directory import find_unfinished
+from dnet.datasets.index import Index, open_index
 from dnet.datasets.reader import EpisodeReader
+from dnet.datasets.stores import is_url
 from dnet.errors import BadEpisode, NoEpisodes
 from dnet.geometry.chamfer import chamfer
+from dnet.types import Place
 
 EPISODE_COLUMNS = {
     "episode": pl.String,
@@ -46,28 +49,35 @@ class EpisodeDescription:
     """One row a frame; motion and Chamfer distance are from the rest frame."""
 
 
-def list_episodes(directory: Path) -> pl.DataFrame:
+def list_episodes(
+    root: Place, *, on_file: Callable[[int, int], None] = lambda _done, _total: None
+) -> pl.DataFrame:
     """Return one row an episode, those that are unfinished or broken with a note.
 
     Columns: episode, frames, shapes (settled after a motion), points (least of any frame),
     seconds (of simulation), MB, finished, note.
 
+    Args:
+        root: A folder or URL; its index is brought up to date.
+        on_file: Called with the number of files read and of all that must be.
+
     Raises:
-        MissingPath: If there is no such directory.
+        MissingPath: If there is no such folder.
         NoEpisodes: If it holds neither an episode nor an unfinished one.
+        Unfetched: If a store does not answer.
     """
-    unfinished = find_unfinished(directory)
+    unfinished = [] if is_url(root) else find_unfinished(Path(root))
+    rows = {path.name: _unfinished_row(path) for path in unfinished}
     try:
-        episodes = find_episodes(directory)
+        rows |= _indexed_rows(open_index(root, on_file=on_file))
     except NoEpisodes:
         if not unfinished:
             raise
-        episodes = []
-    rows = [_row(path) for path in sorted([*episodes, *unfinished])]
-    return pl.DataFrame(rows, schema=EPISODE_COLUMNS, orient="row")
+    ordered = [rows[name] for name in sorted(rows)]
+    return pl.DataFrame(ordered, schema=EPISODE_COLUMNS, orient="row")
 
 
-def describe_episode(path: Path) -> EpisodeDescription:
+def describe_episode(path: Place) -> EpisodeDescription:
     """Return the summary and the frames of one episode.
 
     Raises:
@@ -126,7 +136,34 @@ def _flat(name: str, values: Mapping[str, Any], *, depth: int = 3) -> dict[str, 
     return flat
 
 
-def _row(path: Path) -> tuple[Any, ...]:
+def _indexed_rows(index: Index) -> dict[str, tuple[Any, ...]]:
+    """Return the row of each file, by name."""
+    least = index.frames.group_by("name").agg(pl.col("points").min())
+    files = index.files.join(least, on="name", how="left").with_columns(
+        pl.when(pl.col("note") != "")
+        .then("note")
+        .when(pl.col("finished"))
+        .then(pl.lit(""))
+        .otherwise(pl.lit("interrupted"))
+        .alias("note")
+    )
+    return {
+        row["name"]: (
+            row["episode"] or row["name"].removesuffix(".mcap"),
+            *(
+                (None,) * 4
+                if row["episode"] is None
+                else (row["frames"], row["shapes"], row["points"] or 0, row["seconds"])
+            ),
+            row["bytes"] / 1e6,
+            row["finished"],
+            row["note"],
+        )
+        for row in files.iter_rows(named=True)
+    }
+
+
+def _unfinished_row(path: Path) -> tuple[Any, ...]:
     megabytes = path.stat().st_size / 1e6
     try:
         with EpisodeReader(path) as episode:
@@ -139,20 +176,9 @@ def _row(path: Path) -> tuple[Any, ...]:
                 float(episode.times[-1] - episode.times[0]) if len(episode) else 0.0,
                 megabytes,
                 episode.finished,
-                _note(path, episode),
+                "interrupted, whole frames readable",
             )
     except BadEpisode as error:
-        name = path.name.removesuffix(".part").removesuffix(".mcap")
-        return (name, None, None, None, None, megabytes, False, _why(path, error))
-
-
-def _note(path: Path, episode: EpisodeReader) -> str:
-    if path.suffix == ".part":
-        return "interrupted, whole frames readable"
-    return "" if episode.finished else "interrupted"
-
-
-def _why(path: Path, error: BadEpisode) -> str:
-    """Return what an error says of its file, without the file's name and the way out."""
-    why = str(error).removeprefix(f"{path} ").split(";")[0]
-    return f"unfinished, {why}" if path.suffix == ".part" else why
+        name = path.name.removesuffix(".mcap.part")
+        why = str(error).removeprefix(f"{path} ").split(";")[0]
+        return (name, None, None, None, None, megabytes, False, f"unfinished, {why}")

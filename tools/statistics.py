@@ -9,7 +9,7 @@ from jaxtyping import Float64
 from scipy.spatial.distance import pdist
 
 from dnet.tools.histogram import histogram
-from dnet.tools.statistics_index import Index
+from dnet.tools.statistics_recorded import Recorded
 from dnet.tools.statistics_speed import Speed
 from dnet.tools.statistics_values import (
     Deviation,
@@ -34,7 +34,7 @@ _Values = Float64[np.ndarray, "_"]
 _Points = Float64[np.ndarray, "_ 3"]
 
 
-def statistics(index: Index, speed: Speed | None) -> Statistics:
+def statistics(index: Recorded, speed: Speed | None) -> Statistics:
     """Return the figures of the episodes of `index`, recorded at `speed`."""
     episodes, frames = index.episodes, index.frames
     shapes = frames.filter(pl.col("kind") == "shape")
@@ -66,7 +66,7 @@ def _spread(values: _Values) -> Spread:
     )
 
 
-def _files(index: Index) -> Files:
+def _files(index: Recorded) -> Files:
     sizes = index.episodes["bytes"].to_numpy()
     frames = index.frames.height
     return Files(
@@ -141,7 +141,7 @@ def _from_rest(moved: _Points) -> Motions | None:
     )
 
 
-def _draws(index: Index, shapes: pl.DataFrame) -> Draws | None:
+def _draws(index: Recorded, shapes: pl.DataFrame) -> Draws | None:
     counted = index.episodes.filter("counted")
     if not counted.height:
         return None

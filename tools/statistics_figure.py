@@ -13,7 +13,7 @@ from matplotlib.patches import Ellipse, Rectangle
 from dnet.errors import UnknownPicture
 from dnet.tools.histogram import histogram
 from dnet.tools.statistics import AXES, SCENE
-from dnet.tools.statistics_index import Index
+from dnet.tools.statistics_recorded import Recorded
 from dnet.tools.statistics_values import Draws, Statistics
 
 FORMATS = (".png", ".pdf", ".svg")
@@ -34,7 +34,7 @@ def check_picture(path: Path) -> None:
         raise UnknownPicture(path, FORMATS)
 
 
-def draw_statistics(index: Index, figures: Statistics, path: Path) -> None:
+def draw_statistics(index: Recorded, figures: Statistics, path: Path) -> None:
     """Draw where shapes and manipulation points lie and what was rejected.
 
     Args:
@@ -57,7 +57,7 @@ def draw_statistics(index: Index, figures: Statistics, path: Path) -> None:
     path.write_bytes(content.getvalue())
 
 
-def _draw(index: Index, figures: Statistics) -> Figure:
+def _draw(index: Recorded, figures: Statistics) -> Figure:
     shapes = index.frames.filter(index.frames["kind"] == "shape")
     moved = shapes.select(AXES).to_numpy()
     # No pyplot: a figure of its own draws without a screen and leaves nothing behind.
@@ -104,7 +104,7 @@ def _draw_density(panel: Axes, moved: _Points, across: str, up: str) -> None:
     panel.plot(0, 0, "+", color="#c0392b", markersize=14, markeredgewidth=2, clip_on=False)
 
 
-def _draw_grasps(panel: Axes, index: Index) -> None:
+def _draw_grasps(panel: Axes, index: Recorded) -> None:
     """Draw the manipulation points from above, with the outlines of the objects at rest."""
     outlines = index.episodes.select("shape", "size_x", "size_y").unique(maintain_order=True)
     for shape, length, width in outlines.iter_rows():

@@ -1,4 +1,8 @@
-"""Data frames as tables on a terminal, or whole and unwrapped in a pipe."""
+"""Data frames as tables on a terminal, whole and unwrapped in a pipe, or for machines."""
+
+import json
+import sys
+from typing import Literal
 
 import polars as pl
 from rich.console import Console
@@ -10,6 +14,20 @@ DECIMALS = {"x": 4, "y": 4, "z": 4}
 WRAPPED = ("note",)
 """Columns of prose: these give way on a narrow terminal."""
 UNWRAPPED_WIDTH = 2000
+
+
+Form = Literal["table", "csv", "json"]
+"""For people; for spreadsheets; for programs: a list of objects."""
+
+
+def print_frame(frame: pl.DataFrame, form: Form) -> None:
+    """Print `frame` in one of the forms."""
+    if form == "csv":
+        sys.stdout.write(frame.write_csv())
+    elif form == "json":
+        print(json.dumps(frame.to_dicts(), indent=2, allow_nan=False))  # noqa: T201
+    else:
+        print_table(frame)
 
 
 def print_table(frame: pl.DataFrame) -> None:

@@ -15,22 +15,34 @@ from dnet.commands.inspect_stats import Stats
 class List:
     """List the episodes of a directory: frames, shapes, simulated seconds, size.
 
-    Unfinished and broken files are listed with a note.
+    Unfinished and broken files are listed with a note. The first call indexes the directory; the
+    next ones read new and changed files alone.
 
     Example: dnet inspect ls data/box
     """
 
-    directory: tyro.conf.Positional[Path]
+    directory: Annotated[tyro.conf.Positional[str | Path], tyro.conf.arg(metavar="DIRECTORY|URL")]
     """Where `dnet record` wrote."""
+    csv: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print comma-separated values instead of a table."""
+    json: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print a JSON list of objects instead of a table."""
 
     def run(self) -> None:
-        """Print one row an episode and a line of sums."""
-        from dnet.tools.listing import list_episodes
-        from dnet.tools.tables import print_table
+        """Print one row an episode and, for people, a line of sums."""
+        from rich.console import Console
 
-        episodes = list_episodes(self.directory)
+        from dnet.commands.index_bar import reading
+        from dnet.tools.listing import list_episodes
+        from dnet.tools.tables import print_frame
+
+        with reading(Console(stderr=True)) as on_file:
+            episodes = list_episodes(self.directory, on_file=on_file)
+        if self.csv or self.json:
+            print_frame(episodes, "csv" if self.csv else "json")
+            return
         quiet = (episodes["note"] == "").all()
-        print_table(episodes.drop("note") if quiet else episodes)
+        print_frame(episodes.drop("note") if quiet else episodes, "table")
         print(
             f"{episodes['finished'].sum()} of {episodes.height} episodes finished, "
             f"{episodes['shapes'].sum()} shapes, {episodes['MB'].sum():.1f} MB"
@@ -47,15 +59,23 @@ class Info:
     Example: dnet inspect info data/box/episode-00000.mcap
     """
 
-    file: tyro.conf.Positional[Path]
+    file: Annotated[tyro.conf.Positional[str | Path], tyro.conf.arg(metavar="FILE|URL")]
     """An `.mcap` of `dnet record` or `dnet servo`."""
+    json: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print one JSON object instead: `summary` and `frames`."""
 
     def run(self) -> None:
         """Print the summary and the frames."""
+        from json import dumps
+
         from dnet.tools.listing import describe_episode
         from dnet.tools.tables import print_table
 
         description = describe_episode(self.file)
+        if self.json:
+            frames = description.frames.to_dicts()
+            print(dumps({"summary": description.summary, "frames": frames}, indent=2))
+            return
         width = max(len(key) for key in description.summary)
         for key, value in description.summary.items():
             text = f"{value:.6g}" if isinstance(value, float) else str(value)

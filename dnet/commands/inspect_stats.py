@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import tyro
 
 if TYPE_CHECKING:
-    from dnet.tools.statistics_index import Index
+    from dnet.tools.statistics_recorded import Recorded
 
 
 @dataclass(frozen=True)
@@ -57,20 +57,11 @@ class Stats:
         else:
             print_statistics(figures)
 
-    def _read(self) -> "Index":
+    def _read(self) -> "Recorded":
         from rich.console import Console
 
-        from dnet.commands.progress import progress
-        from dnet.tools.statistics_index import read_index
+        from dnet.commands.index_bar import reading
+        from dnet.tools.statistics_recorded import read_recorded
 
-        console = Console(stderr=True)
-        bars = progress(console, "episodes")
-        # Reading is no result: none of it stays on the screen, or goes into a log.
-        bars.live.transient = True
-        bars.disable = not console.is_terminal
-        with bars:
-            task = bars.add_task("reading", total=None)
-            return read_index(
-                self.directory,
-                on_episode=lambda done, total: bars.update(task, completed=done, total=total),
-            )
+        with reading(Console(stderr=True)) as on_episode:
+            return read_recorded(self.directory, on_episode=on_episode)

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,8 @@ def run(*arguments: str | Path) -> None:
 
 
 def test_its_words_are_ls_and_info() -> None:
-    assert tyro.cli(Inspect, args=["ls", "data"]) == Inspect(List(Path("data")))
-    assert tyro.cli(Inspect, args=["info", "a.mcap"]) == Inspect(Info(Path("a.mcap")))
+    assert tyro.cli(Inspect, args=["ls", "data"]) == Inspect(List("data"))
+    assert tyro.cli(Inspect, args=["info", "a.mcap"]) == Inspect(Info("a.mcap"))
 
 
 def test_ls_prints_a_row_an_episode_and_the_sums(
@@ -28,6 +29,20 @@ def test_ls_prints_a_row_an_episode_and_the_sums(
     assert first.split()[:5] == ["a", "3", "1", "64", "1.00"]
     assert second.split()[:5] == ["b", "7", "3", "64", "3.00"]
     assert sums.startswith("2 of 2 episodes finished, 4 shapes")
+
+
+def test_ls_and_info_speak_to_machines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / "a.mcap", frames(4))
+    run("ls", tmp_path, "--json")
+    (listed,) = json.loads(capsys.readouterr().out)
+    assert (listed["episode"], listed["frames"], listed["finished"]) == ("a", 7, True)
+    run("ls", tmp_path, "--csv")
+    header, row = capsys.readouterr().out.splitlines()
+    assert dict(zip(header.split(","), row.split(","), strict=True))["shapes"] == "3"
+    run("info", path, "--json")
+    told = json.loads(capsys.readouterr().out)
+    assert told["summary"]["result.rejected.folded"] == 2
+    assert [frame["kind"] for frame in told["frames"]] == [one.kind for one in frames(4)]
 
 
 def test_ls_goes_on_past_a_broken_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

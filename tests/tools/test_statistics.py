@@ -11,7 +11,7 @@ from dnet.errors import MissingPath, NoEpisodes
 from dnet.geometry.pose import rotation_z
 from dnet.recorders.episode import EpisodeWriter
 from dnet.tools.statistics import statistics
-from dnet.tools.statistics_index import read_index
+from dnet.tools.statistics_recorded import read_recorded
 from dnet.tools.statistics_values import Statistics
 from dnet.types import Frame, FrameKind, Scene, Tissue
 from tests.recorders.rollout import ARMS, SCENE, frame, meta
@@ -48,7 +48,7 @@ def record(
 
 
 def figures(directory: Path) -> Statistics:
-    return statistics(read_index(directory), None)
+    return statistics(read_recorded(directory), None)
 
 
 def test_the_files_are_counted_and_weighed(tmp_path: Path) -> None:
@@ -262,16 +262,16 @@ def test_every_file_is_announced(tmp_path: Path) -> None:
         record(tmp_path / f"{name}.mcap", CORNERS[:1])
     (tmp_path / "d.mcap").write_bytes(b"")
     announced: list[tuple[int, int]] = []
-    read_index(tmp_path, on_episode=lambda done, total: announced.append((done, total)))
+    read_recorded(tmp_path, on_episode=lambda done, total: announced.append((done, total)))
     assert announced == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_nowhere_and_nothing_finished_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MissingPath):
-        read_index(tmp_path / "nowhere")
+        read_recorded(tmp_path / "nowhere")
     with pytest.raises(NoEpisodes, match="dnet record"):
-        read_index(tmp_path)
+        read_recorded(tmp_path)
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n and no more")
     (tmp_path / "b.mcap.part").write_bytes(b"")
     with pytest.raises(NoEpisodes, match="1 unfinished and 1 broken"):
-        read_index(tmp_path)
+        read_recorded(tmp_path)

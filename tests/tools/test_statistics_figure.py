@@ -7,19 +7,19 @@ from matplotlib.image import imread
 from dnet.errors import UnknownPicture
 from dnet.tools.statistics import statistics
 from dnet.tools.statistics_figure import check_picture, draw_statistics
-from dnet.tools.statistics_index import Index, read_index
+from dnet.tools.statistics_recorded import Recorded, read_recorded
 from tests.recorders.rollout import frames, write
 
 
 @pytest.fixture
-def index(tmp_path: Path) -> Index:
+def index(tmp_path: Path) -> Recorded:
     write(tmp_path / "data" / "a.mcap", frames(12))
-    return read_index(tmp_path / "data")
+    return read_recorded(tmp_path / "data")
 
 
-def test_the_picture_shows_the_data(index: Index, tmp_path: Path) -> None:
+def test_the_picture_shows_the_data(index: Recorded, tmp_path: Path) -> None:
     write(tmp_path / "other" / "a.mcap", frames(12, seed=1))
-    other = read_index(tmp_path / "other")
+    other = read_recorded(tmp_path / "other")
     pictures = []
     for number, seen in enumerate((index, other)):
         path = tmp_path / "pictures" / f"{number}.png"
@@ -33,7 +33,7 @@ def test_the_picture_shows_the_data(index: Index, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.PDF", "a.svg"])
-def test_the_same_figures_draw_the_same_bytes(index: Index, tmp_path: Path, name: str) -> None:
+def test_the_same_figures_draw_the_same_bytes(index: Recorded, tmp_path: Path, name: str) -> None:
     found = statistics(index, None)
     written = []
     for run in ("one", "two"):
@@ -44,8 +44,8 @@ def test_the_same_figures_draw_the_same_bytes(index: Index, tmp_path: Path, name
 
 def test_a_recording_with_many_shapes_and_one_with_none_are_drawn(tmp_path: Path) -> None:
     write(tmp_path / "few" / "a.mcap", frames(1))
-    few = read_index(tmp_path / "few")
-    many = Index(
+    few = read_recorded(tmp_path / "few")
+    many = Recorded(
         few.directory,
         few.episodes,
         few.frames.sample(3000, with_replacement=True, seed=0).with_columns(
@@ -63,7 +63,7 @@ def test_a_recording_with_many_shapes_and_one_with_none_are_drawn(tmp_path: Path
 
 def test_a_directory_with_a_dollar_in_its_name_is_no_formula(tmp_path: Path) -> None:
     write(tmp_path / "$\\bad$" / "a.mcap", frames(2))
-    index = read_index(tmp_path / "$\\bad$")
+    index = read_recorded(tmp_path / "$\\bad$")
     draw_statistics(index, statistics(index, None), tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 
