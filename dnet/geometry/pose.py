@@ -1,5 +1,7 @@
 """Rigid transforms as 4x4 matrices: rotation above, translation in the last column."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
@@ -37,12 +39,31 @@ def inverse(matrix: Pose) -> Pose:
 
 def quaternion(rotation: Rotation3) -> Float64[np.ndarray, "4"]:
     """Return the unit quaternion x y z w of a rotation, with w >= 0."""
-    return np.asarray(Rotation.from_matrix(rotation).as_quat(canonical=True), dtype=np.float64)
+    return quaternions(rotation[None])[0]
+
+
+def quaternions(rotations: Float64[np.ndarray, "n 3 3"]) -> Float64[np.ndarray, "n 4"]:
+    """Return the unit quaternions x y z w of rotations, with w >= 0."""
+    return np.asarray(Rotation.from_matrix(rotations).as_quat(canonical=True), dtype=np.float64)
 
 
 def transform(parent: str, child: str, matrix: Pose) -> Transform:
     """Return the named transform of `child` in `parent`."""
-    return Transform(parent, child, matrix[:3, 3].copy(), quaternion(matrix[:3, :3]))
+    return transforms([(parent, child)], matrix[None])[0]
+
+
+def transforms(
+    names: Sequence[tuple[str, str]], matrices: Float64[np.ndarray, "n 4 4"]
+) -> list[Transform]:
+    """Return named transforms, each of a child in its parent.
+
+    Many together cost hardly more than one: scipy checks what it is given once.
+    """
+    turns = quaternions(matrices[:, :3, :3])
+    return [
+        Transform(parent, child, matrix[:3, 3].copy(), turn)
+        for (parent, child), matrix, turn in zip(names, matrices, turns, strict=True)
+    ]
 
 
 def look_at(eye: Point, target: Point) -> Pose:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dnet.geometry.pose import pose, rotation_x, rotation_z, transform
+from dnet.geometry.pose import pose, rotation_x, rotation_z, transforms
 from dnet.sim.psm import JOINT_NAMES, Psm
 from dnet.sim.psm_links import LINK_JOINTS
 from dnet.types import ARMS, Joints, Point, Pose, Transform
@@ -78,14 +78,14 @@ class ArmModel:
 
         A link's name is the arm's, a slash, and the link's name in the URDF.
         """
-        found = []
+        names, frames = [], []
         for name, arm, positions in zip(ARMS, self.placement.arms, joints, strict=True):
-            found.append(transform("world", f"{name}/base_link", arm.base))
-            found += [
-                transform(f"{name}/{link.parent}", f"{name}/{link.child}", link.frame(positions))
-                for link in LINK_JOINTS
-            ]
-        return found
+            names.append(("world", f"{name}/base_link"))
+            frames.append(arm.base)
+            for link in LINK_JOINTS:
+                names.append((f"{name}/{link.parent}", f"{name}/{link.child}"))
+                frames.append(link.frame(positions))
+        return transforms(names, np.stack(frames))
 
     def tip(self, joints: Joints) -> Point:
         """Return where the moving arm's jaws meet, in the world."""
