@@ -55,6 +55,7 @@ def statistics(index: Recorded, speed: Speed | None) -> Statistics:
         from_rest=_from_rest(moved),
         draws=_draws(index, shapes),
         deviation=_deviation(episodes, shapes),
+        oddities=index.oddities,
         speed=speed,
     )
 

@@ -14,6 +14,7 @@ from dnet.datasets.directory import find_unfinished
 from dnet.datasets.index import open_index
 from dnet.errors import NoEpisodes
 from dnet.geometry.pose import rotation_z
+from dnet.tools.statistics_oddities import Oddities, oddities
 
 _EPISODES = {
     "episode": pl.String,
@@ -49,6 +50,7 @@ class Recorded:
     in the first frame, along the world's axes)."""
     rejected: pl.DataFrame
     """episode, reason, count."""
+    oddities: Oddities
     unfinished: int
     """Files of recordings that run or were interrupted."""
     broken: int
@@ -86,6 +88,7 @@ def read_recorded(
         pl.DataFrame([_row(row) for row in rows], schema=_EPISODES, orient="row"),
         _frames(index.frames.join(finished.select("name"), on="name", maintain_order="left")),
         pl.DataFrame(rejected, schema=_REJECTED, orient="row"),
+        oddities(index),
         unfinished,
         broken,
     )

@@ -1,12 +1,13 @@
 """The figures of a recording as text: tables and bars."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import polars as pl
 from rich.console import Console
 
 from dnet.tools.histogram import Histogram, bar, skyline
 from dnet.tools.statistics import SCENE
+from dnet.tools.statistics_oddities import Oddities
 from dnet.tools.statistics_speed import TIMINGS, Speed
 from dnet.tools.statistics_values import Distribution, Draws, Motions, Spread, Statistics, Tissues
 from dnet.tools.tables import print_table
@@ -24,6 +25,7 @@ def print_statistics(figures: Statistics) -> None:
     _head(console, "manipulation points in the object's own frame, mm")
     rows = [_spread_row(*item) for item in figures.manipulation_point_mm.items()]
     print_table(pl.DataFrame(rows))
+    _print_oddities(figures.oddities, console)
     if figures.draws is not None:
         _print_draws(figures.draws, console)
     if figures.speed is not None:
@@ -106,6 +108,31 @@ def _motions_row(name: str, motions: Motions) -> dict[str, object]:
         "no motion mm²": motions.zero_mse_mm2,
         "mean motion mm²": motions.mean_mse_mm2,
     }
+
+
+def _print_oddities(odd: Oddities, console: Console) -> None:
+    lines = [f"{name} is the same in all shapes" for name in odd.without_variance]
+    for far in odd.outliers:
+        metres = far.value != "points"
+        low, high = (1e3 * edge if metres else edge for edge in far.fence)
+        beyond = f"{low:.1f} to {high:.1f}" + (" mm" if metres else "")
+        lines.append(f"{far.count} shapes with {far.value} beyond {beyond}: {_some(far.examples)}")
+    if odd.duplicate_episodes:
+        lines.append(f"files that hold an episode twice: {_some(odd.duplicate_episodes)}")
+    if odd.duplicate_clouds:
+        lines.append(f"{odd.duplicate_clouds} settled frames have a cloud that another has too")
+    if odd.leaked_clouds:
+        lines.append(
+            f"{odd.leaked_clouds} clouds are among those to learn from and those to judge by, "
+            f"with {odd.validation:.0%} of the episodes to judge by"
+        )
+    _head(console, "oddities")
+    for line in lines or ["none: all varies, nothing lies far out, comes twice or leaks"]:
+        console.print(line, markup=False)
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
 def _print_draws(draws: Draws, console: Console) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dnet.tools.histogram import Histogram
+from dnet.tools.statistics_oddities import Oddities
 from dnet.tools.statistics_speed import Speed
 
 
@@ -116,4 +117,5 @@ class Statistics:
     """From the rest frame to every shape."""
     draws: Draws | None
     deviation: Deviation | None
+    oddities: Oddities
     speed: Speed | None

@@ -52,6 +52,7 @@ def test_a_recording_with_many_shapes_and_one_with_none_are_drawn(tmp_path: Path
             kind=np.full(3000, "shape"), x=np.linspace(-20.0, 40.0, 3000)
         ),
         few.rejected,
+        few.oddities,
         few.unfinished,
         few.broken,
     )
