@@ -80,7 +80,7 @@ class McapFile:
             for number, chunk in enumerate(self._summary.chunks):
                 offset = chunk.indexes.get(channel)
                 if offset is not None:
-                    rows = self._message_index(number, offset)
+                    rows = self._message_index(number, offset, channel=channel)
                     found.extend((time, number, at) for at, time in rows)
         try:
             return np.array(found, dtype=np.int64).reshape(-1, 3)
@@ -140,7 +140,7 @@ class McapFile:
             raise damaged(self.path, f"its attachment {name} fails its checksum")
         return content
 
-    def _message_index(self, number: int, offset: int) -> list[tuple[int, int]]:
+    def _message_index(self, number: int, offset: int, *, channel: int) -> list[tuple[int, int]]:
         """Return offset in the chunk and log time of each message, in file order."""
         chunks = self._summary.chunks
         # A chunk's indexes lie between it and the next chunk: no two chunks can share one.
@@ -148,9 +148,9 @@ class McapFile:
         limit = chunks[number + 1].offset if number + 1 < len(chunks) else len(self._source)
         start = offset + _MESSAGE_INDEX.size
         if first <= offset and start <= limit:
-            opcode, length, _, size = _MESSAGE_INDEX.unpack(self._source.view(offset, start))
+            opcode, length, of, size = _MESSAGE_INDEX.unpack(self._source.view(offset, start))
             whole = length == size + 6 and size <= limit - start and size % _TIME.size == 0
-            if opcode == Opcode.MESSAGE_INDEX and whole:
+            if opcode == Opcode.MESSAGE_INDEX and whole and of == channel:
                 pairs = _TIME.iter_unpack(self._source.view(start, start + size))
                 return sorted((at, time) for time, at in pairs)
         raise damaged(self.path, f"the message index of its chunk {number} is broken")

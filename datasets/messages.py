@@ -38,10 +38,12 @@ UNREADABLE = (ValueError, TypeError, KeyError, OverflowError, RecursionError, De
 JOINTS_PER_ARM = 6
 WORLD = "world"
 LARGEST_MESSAGE = 64 * 1024
-"""Bytes of a message without points or pixels that are still parsed: dnet writes 5 KiB at most, and
+"""Bytes of a message without points or pixels that are still parsed: dnet writes 3 KiB at most, and
 parsed ones take many times their bytes."""
 MOST_TRANSFORMS = 256
-"""Transforms of one message that are still read: dnet writes 23."""
+"""Transforms of one message that are still read: dnet writes 25."""
+UNIT_TOLERANCE = 0.01
+"""How far the length of a quaternion may be from 1 for a rotation that is still read."""
 
 _KINDS = get_args(FrameKind)
 _SHAPES = get_args(TissueShape)
@@ -119,6 +121,10 @@ def read_pose(message: memoryview, *, frame: str) -> Pose:
     """Return where `frame` stands in the world, of a foxglove.FrameTransforms."""
     for entry in read_transforms(message):
         if (entry.parent, entry.child) == (WORLD, frame):
+            # Of a quaternion of length 1e200 scipy makes a matrix of zeros.
+            length = math.hypot(*entry.rotation)
+            if not abs(length - 1) <= UNIT_TOLERANCE:
+                raise ValueError(f"a quaternion of length {length:g} for {frame[:40]!r}, not 1")
             rotation = Rotation.from_quat(entry.rotation).as_matrix()
             placed = pose(rotation, entry.translation)
             if np.isfinite(placed).all():

@@ -93,7 +93,7 @@ def _copy(message: memoryview) -> Cloud:
 
 def _walk(message: memoryview) -> list[tuple[int, int, int]]:
     """Return number, begin and end of each field of a protobuf message."""
-    fields = []
+    fields: list[tuple[int, int, int]] = []
     place, end = 0, len(message)
     while place < end:
         tag, place = _varint(message, place)

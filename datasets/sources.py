@@ -42,19 +42,23 @@ class MappedFile:
 
     Raises:
         MissingPath: If there is no such file.
-        BadEpisode: If it is empty, for then nothing can be mapped.
+        BadEpisode: If it cannot be opened, or is empty, for then nothing can be mapped.
     """
 
     def __init__(self, path: Path) -> None:
         if not path.is_file():
             raise MissingPath(path, "episode", "`dnet inspect ls DIRECTORY` lists what is there")
-        with path.open("rb") as file:
-            try:
+        try:
+            with path.open("rb") as file:
                 self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-            except ValueError as error:
-                raise BadEpisode(
-                    path, "is not an MCAP file: it is empty", "give an .mcap of `dnet record`"
-                ) from error
+        except OSError as error:
+            raise BadEpisode(
+                path, f"cannot be opened ({error.strerror})", "see that you may read it"
+            ) from error
+        except ValueError as error:
+            raise BadEpisode(
+                path, "is not an MCAP file: it is empty", "give an .mcap of `dnet record`"
+            ) from error
         self._bytes = memoryview(self._map)
 
     def __len__(self) -> int:

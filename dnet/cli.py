@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         command.run()
     except DnetError as error:
-        sys.exit(f"dnet: {error}")
+        sys.exit(f"dnet: {_printable(str(error))}")
     except KeyboardInterrupt:
         print("dnet: interrupted; what was finished is kept", file=sys.stderr)
         sys.exit(130)
@@ -71,3 +71,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # Somebody piped us into `head`: not our error, and nothing more can be said there.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+
+
+def _printable(text: str) -> str:
+    """Return `text` without what would steer a terminal: names in a file may hold anything."""
+    return "".join(
+        char if char.isprintable() or char == "\n" else char.encode("unicode_escape").decode()
+        for char in text
+    )

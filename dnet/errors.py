@@ -468,3 +468,54 @@ class FaultyEpisodes(DnetError, ValueError):
             "errors elsewhere and record them again, or save the whole frames of a damaged one "
             "with the official MCAP tool (`mcap recover`)"
         )
+
+
+class NoSuchEpisode(DnetError, LookupError):
+    """An episode that a dataset lacks."""
+
+    def __init__(self, root: Path | str, wanted: str, episodes: list[str]) -> None:
+        shown = ", ".join(episodes[:4]) + (", ..." if len(episodes) > 4 else "")
+        super().__init__(
+            f"{root} has no readable episode {wanted}, neither as an id nor as a number: it has "
+            f"{len(episodes)} ({shown}); `dnet inspect ls {root}` lists them"
+        )
+
+
+class BadCondition(DnetError, ValueError):
+    """A condition on frames that is none."""
+
+    def __init__(self, condition: str, why: str, columns: list[str]) -> None:
+        super().__init__(
+            f"{condition!r} is no condition on frames: {why}; write SQL that is true or false of "
+            f"each, with the columns {', '.join(columns)}"
+        )
+
+
+class NothingMatches(DnetError, LookupError):
+    """A condition that holds nowhere."""
+
+    def __init__(self, root: Path | str, condition: str, frames: int) -> None:
+        super().__init__(
+            f"{condition!r} holds for none of {frames} frames of {root}; ask for less, "
+            f"`dnet inspect stats {root}` tells what they are like"
+        )
+
+
+class NoFolder(DnetError, ValueError):
+    """A choice of episodes where no folder was given to choose from."""
+
+    def __init__(self, option: str) -> None:
+        super().__init__(
+            f"{option} chooses among the episodes of a directory, and none was given; "
+            "give the directory, or leave the option out"
+        )
+
+
+class Unmerged(DnetError, RuntimeError):
+    """Recordings that Rerun did not write into one file."""
+
+    def __init__(self, path: Path, count: int, why: str) -> None:
+        super().__init__(
+            f"Rerun could not write {count} recordings into {path}: {why}; make room, or save "
+            "one episode at a time"
+        )

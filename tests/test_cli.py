@@ -156,3 +156,11 @@ def test_a_demo_over_another_demo_is_refused(
     (tmp_path / "demo.json").write_text('{"options": {"pairs": 99}, "seconds": {}}')
     message = refused(capsys, "demo", "--out", tmp_path)
     assert "already holds a demo with other options ({'pairs': 99})" in message
+
+
+def test_a_name_cannot_steer_the_terminal(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as refused:
+        main(["inspect", "info", str(tmp_path / "\x1b[2J.mcap")])
+    assert str(refused.value.code).startswith("dnet: ")
+    assert "\\x1b[2J.mcap does not exist" in str(refused.value.code)
+    assert "\x1b" not in str(refused.value.code)

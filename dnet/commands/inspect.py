@@ -9,6 +9,7 @@ import tyro
 from dnet.commands.inspect_material import Material
 from dnet.commands.inspect_repair import Repair
 from dnet.commands.inspect_stats import Stats
+from dnet.commands.inspect_validate import Validate
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ class Inspect:
         Annotated[List, tyro.conf.subcommand("ls")]
         | Annotated[Info, tyro.conf.subcommand("info")]
         | Annotated[Stats, tyro.conf.subcommand("stats")]
+        | Annotated[Validate, tyro.conf.subcommand("validate")]
         | Annotated[Repair, tyro.conf.subcommand("repair")]
         | Annotated[Material, tyro.conf.subcommand("material")]
     ]
