@@ -1,5 +1,6 @@
 """Chamfer distances of many clouds to one, whose search tree is built once."""
 
+import numpy as np
 from scipy.spatial import cKDTree
 
 from dnet.types import Cloud
@@ -22,4 +23,4 @@ class ChamferTo:
         tree = cKDTree(cloud, balanced_tree=False, compact_nodes=False)
         there, _ = self._tree.query(cloud)
         back, _ = tree.query(self._reference)
-        return float((there.mean() + back.mean()) / 2)
+        return float((np.mean(there) + np.mean(back)) / 2)

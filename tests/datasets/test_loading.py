@@ -39,7 +39,7 @@ def test_sides_by_shape_share_the_rest_frames_alone(folder: Path) -> None:
     table = table_of(folder)
     goals = []
     for side in ("training", "validation"):
-        division = Division(side, by="shape", fraction=0.5)  # type: ignore[arg-type]
+        division = Division(side, by="shape", fraction=0.5)
         part = division.of(table)
         stream = load_samples(folder, pairs="rest", division=division)
         goals.append(
