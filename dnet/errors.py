@@ -465,8 +465,8 @@ class FaultyEpisodes(DnetError, ValueError):
     def __init__(self, errors: int, warnings: int, episodes: int) -> None:
         super().__init__(
             f"{errors} errors and {warnings} warnings in {episodes} episodes; move the files with "
-            "errors elsewhere and record them again, or save the whole frames of a damaged one "
-            "with the official MCAP tool (`mcap recover`)"
+            "errors elsewhere and record them again, or save their whole frames with "
+            "`dnet inspect repair`"
         )
 
 
@@ -519,3 +519,29 @@ class Unmerged(DnetError, RuntimeError):
             f"Rerun could not write {count} recordings into {path}: {why}; make room, or save "
             "one episode at a time"
         )
+
+
+class ClashingEpisodes(DnetError, ValueError):
+    """Different episodes that one dataset cannot tell apart."""
+
+    def __init__(self, what: str, name: str, paths: list[str]) -> None:
+        super().__init__(
+            f"{' and '.join(paths)} are different, but have one {what}: {name}; keep them in "
+            "folders of their own, or record one of them with another --seed"
+        )
+
+
+class BadArrays(DnetError, ValueError):
+    """A file of arrays that no episode can be made of."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        super().__init__(
+            f"{path} {why}; `dnet inspect import --help` says what it must hold, in metres"
+        )
+
+
+class UnusedOption(DnetError, ValueError):
+    """An option that does nothing beside the others."""
+
+    def __init__(self, option: str, needs: str) -> None:
+        super().__init__(f"{option} does nothing without {needs}; leave one out or add the other")

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-DECIMALS = {"x": 4, "y": 4, "z": 4}
+DECIMALS = {name: 4 for name in ("x", "y", "z", "motion_x", "motion_y", "motion_z")}
 """Digits after the point by column; two for the others."""
 WRAPPED = ("note",)
 """Columns of prose: these give way on a narrow terminal."""

@@ -6,8 +6,12 @@ from typing import Annotated
 
 import tyro
 
+from dnet.commands.inspect_diff import Diff
+from dnet.commands.inspect_filter import Filter
 from dnet.commands.inspect_material import Material
+from dnet.commands.inspect_merge import Merge
 from dnet.commands.inspect_repair import Repair
+from dnet.commands.inspect_split import Split
 from dnet.commands.inspect_stats import Stats
 from dnet.commands.inspect_validate import Validate
 
@@ -86,7 +90,7 @@ class Info:
 
 @dataclass(frozen=True)
 class Inspect:
-    """Look at what was recorded: a directory of episodes, its figures, or one episode.
+    """Look after what was recorded: list, describe, check, save, compare, part and merge it.
 
     Example: dnet inspect ls data/box
     """
@@ -97,6 +101,10 @@ class Inspect:
         | Annotated[Stats, tyro.conf.subcommand("stats")]
         | Annotated[Validate, tyro.conf.subcommand("validate")]
         | Annotated[Repair, tyro.conf.subcommand("repair")]
+        | Annotated[Merge, tyro.conf.subcommand("merge")]
+        | Annotated[Split, tyro.conf.subcommand("split")]
+        | Annotated[Filter, tyro.conf.subcommand("filter")]
+        | Annotated[Diff, tyro.conf.subcommand("diff")]
         | Annotated[Material, tyro.conf.subcommand("material")]
     ]
 

@@ -1,0 +1,76 @@
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dnet.datasets.index import open_index
+from dnet.errors import BadEpisode, ClashingEpisodes, OccupiedOutput, TooFew
+from dnet.tools.merging import merge_datasets
+from dnet.tools.placing import place_episodes
+from dnet.tools.splitting import split_dataset
+from dnet.training.episodes import divide
+from tests.datasets.dataset import write_dataset
+from tests.recorders.rollout import frames, write
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.mcap")}
+
+
+@pytest.mark.parametrize("copy", [False, True])
+def test_files_get_a_second_name_or_a_copy(tmp_path: Path, copy: bool) -> None:
+    source = write(tmp_path / "a.mcap", frames(2))
+    place_episodes({"b.mcap": source}, tmp_path / "out", copy=copy)
+    placed = tmp_path / "out" / "b.mcap"
+    assert placed.read_bytes() == source.read_bytes()
+    assert placed.samefile(source) != copy
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["b.mcap"]
+    with pytest.raises(OccupiedOutput, match=r"1 recordings, such as b\.mcap"):
+        place_episodes({"c.mcap": source}, tmp_path / "out")
+    with pytest.raises(OccupiedOutput, match="a file"):
+        place_episodes({"c.mcap": source}, source)
+
+
+def test_the_folders_of_a_split_are_the_sides_of_a_training(tmp_path: Path) -> None:
+    folder = write_dataset(tmp_path / "data", (2, 3, 4, 2, 3))
+    index = open_index(folder)
+    sides = split_dataset(index, tmp_path / "out", fraction=0.4, seed=3)
+    division = divide(index, fraction=0.4, seed=3)
+    for side, surveys in zip(sides, (division.training, division.validation), strict=True):
+        ids = {f"{survey.episode_id}.mcap" for survey in surveys}
+        assert set(contents(side.folder)) == ids
+        assert side.episodes == len(ids)
+        assert side.shapes == sum(survey.frames - 1 for survey in surveys)
+    only = open_index(write_dataset(tmp_path / "one", (2,)))
+    with pytest.raises(TooFew, match="is 1, must be at least 2"):
+        split_dataset(only, tmp_path / "two", fraction=0.4, seed=3)
+
+
+def test_a_merged_dataset_has_the_episodes_of_all_once(tmp_path: Path) -> None:
+    one, other = write_dataset(tmp_path / "one", (2, 3)), tmp_path / "other"
+    other.mkdir()
+    shutil.copy(one / "episode-0.mcap", other)
+    write(other / "episode-7.mcap", frames(2, seed=7))
+    merged = merge_datasets([open_index(one), open_index(other)], tmp_path / "both")
+    assert contents(tmp_path / "both") == contents(one) | contents(other)
+    assert merged.episodes == 3
+    assert merged.repeated == (str(other / "episode-0.mcap"),)
+
+
+def test_different_episodes_of_one_id_are_refused(tmp_path: Path) -> None:
+    one, other = write_dataset(tmp_path / "one", (2,)), tmp_path / "other"
+    other.mkdir()
+    write(other / "episode-0.mcap", frames(3, seed=5))
+    indexes = [open_index(folder) for folder in (one, other)]
+    with pytest.raises(ClashingEpisodes, match=r"one/episode-0\.mcap and .*have one episode"):
+        merge_datasets(indexes, tmp_path / "both")
+    assert not (tmp_path / "both").exists()
+
+
+def test_files_that_cannot_be_read_are_refused_or_left_out(tmp_path: Path) -> None:
+    one = write_dataset(tmp_path / "one", (2,))
+    (one / "noise.mcap").write_bytes(b"noise")
+    with pytest.raises(BadEpisode, match=r"noise\.mcap is not an MCAP file"):
+        merge_datasets([open_index(one)], tmp_path / "both")
+    merged = merge_datasets([open_index(one)], tmp_path / "both", skip_broken=True)
+    assert (merged.episodes, merged.broken) == (1, (str(one / "noise.mcap"),))
