@@ -501,16 +501,6 @@ class NothingMatches(DnetError, LookupError):
         )
 
 
-class NoFolder(DnetError, ValueError):
-    """A choice of episodes where no folder was given to choose from."""
-
-    def __init__(self, option: str) -> None:
-        super().__init__(
-            f"{option} chooses among the episodes of a directory, and none was given; "
-            "give the directory, or leave the option out"
-        )
-
-
 class Unmerged(DnetError, RuntimeError):
     """Recordings that Rerun did not write into one file."""
 

@@ -1,33 +1,45 @@
 """Playing what was recorded: episodes and runs, in a window, as a picture or as a recording."""
 
 import shutil
+import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording
-from dnet.recorders.replay import OpenEpisode, replay
+from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording, Unmerged
+from dnet.recorders.blueprint import Company
+from dnet.recorders.replay import OpenEpisode, application, replay
 from dnet.recorders.salvage import whole_recording
-from dnet.recorders.viewer import draw, show
+from dnet.recorders.viewer import RERUN, draw, show
+from dnet.types import Place
+
+Progress = Callable[[int, int], None]
+"""Is told how many files are made ready, and how many must be."""
 
 
 def play(
-    files: Sequence[Path],
+    files: Sequence[Place],
     *,
     open_episode: OpenEpisode,
     screenshot: Path | None = None,
     save: Path | None = None,
     seconds: float | None = None,
+    watched: AbstractContextManager[Progress] | None = None,
 ) -> None:
     """Show episodes (`.mcap`) and runs (`.rrd`), also unfinished ones (`.part`).
 
+    All episodes of one kind are recordings of one application, which share its layout; they are
+    made ready one at a time, and on the disk.
+
     Args:
-        files: What to show; a picture and a saved recording take the first alone.
+        files: What to show; the URL of an episode will do. A picture shows the first alone.
         open_episode: Opens an episode file.
         screenshot: Draw one picture into this file instead of opening a window.
-        save: Write the recording to this `.rrd` instead of opening a window.
+        save: Write the recordings to this `.rrd` instead of opening a window.
         seconds: When to draw the picture, in seconds of simulation; left out, the end of a
             servo run and the largest motion of an episode.
+        watched: Entered while the files are made ready, and told how far that is.
 
     Raises:
         TooFew: If there are no files.
@@ -35,48 +47,100 @@ def play(
         UnknownRecording: If a file is neither an episode nor a run.
         BadEpisode: If an episode or a run cannot be read.
         OccupiedOutput: If `save` is already there.
+        Unmerged: If Rerun cannot write several recordings into one file.
     """
-    if not files:
+    # A file that is named twice is one recording.
+    chosen = list(dict.fromkeys(files))
+    if not chosen:
         raise TooFew("number of files to play", 0, 1)
     if save is not None and save.exists():
         raise OccupiedOutput(save, "a Rerun recording")
-    for file in files:
+    for file in chosen:
         _check(file)
+    if save is None and screenshot is not None:
+        chosen = chosen[:1]
     with tempfile.TemporaryDirectory() as directory:
-        chosen = files if screenshot is None and save is None else files[:1]
-        shown: list[tuple[Path, float | None]] = []
-        for number, file in enumerate(chosen):
-            # A directory each, for two files may have the same name.
-            place = Path(directory) / str(number)
-            place.mkdir()
-            shown.append(_recording(file, place, open_episode))
-        recording, best = shown[0]
+        with watched or nullcontext(_unwatched) as progress:
+            shown = _made_ready(chosen, Path(directory), open_episode, progress)
+        recordings = [path for path, _ in shown]
+        first, best = shown[0]
         if save is not None:
-            save.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(recording, save)
+            _save(recordings, save)
         if screenshot is not None:
-            draw(recording, screenshot, seconds=best if seconds is None else seconds)
+            draw(first, screenshot, seconds=best if seconds is None else seconds)
         if screenshot is None and save is None:
-            show([path for path, _ in shown])
+            show(recordings)
 
 
-def _recording(file: Path, place: Path, open_episode: OpenEpisode) -> tuple[Path, float | None]:
-    """Return `file` as an `.rrd`, and the time that shows it best if that is known."""
-    name = file.name.removesuffix(".part")
-    if name.endswith(".rrd"):
-        return whole_recording(file, place), None
-    copy = place / Path(name).with_suffix(".rrd").name
+def _unwatched(done: int, total: int) -> None:
+    pass
+
+
+def _made_ready(
+    files: Sequence[Place], directory: Path, open_episode: OpenEpisode, progress: Progress
+) -> list[tuple[Path, float | None]]:
+    """Return each file as an `.rrd`, and the time that shows it best if that is known."""
+    shown: list[tuple[Path, float | None]] = []
+    laid_out: set[str] = set()
+    progress(0, len(files))
+    for number, file in enumerate(files):
+        # A directory each, for two files may have the same name.
+        place = directory / str(number)
+        place.mkdir()
+        if _name(file).endswith(".rrd"):
+            shown.append((whole_recording(Path(file), place), None))
+        else:
+            company: Company = "alone" if len(files) == 1 else "several"
+            shown.append(_converted(file, place, open_episode, laid_out, company))
+        progress(number + 1, len(files))
+    return shown
+
+
+def _converted(
+    file: Place,
+    place: Path,
+    open_episode: OpenEpisode,
+    laid_out: set[str],
+    company: Company,
+) -> tuple[Path, float]:
+    """Return an episode as an `.rrd`, with a layout if it is the first of its application."""
+    copy = place / Path(_name(file)).with_suffix(".rrd").name
     episode = open_episode(file)
     try:
-        return copy, replay(episode, copy)
+        kind = application(episode)
+        best = replay(episode, copy, company=None if kind in laid_out else company)
     finally:
         episode.close()
+    laid_out.add(kind)
+    return copy, best
 
 
-def _check(file: Path) -> None:
-    name = file.name.removesuffix(".part")
-    if not name.endswith((".mcap", ".rrd")):
-        raise UnknownRecording(file)
+def _save(recordings: Sequence[Path], save: Path) -> None:
+    save.parent.mkdir(parents=True, exist_ok=True)
+    if len(recordings) == 1:
+        shutil.copyfile(recordings[0], save)
+        return
+    part = save.with_name(save.name + ".part")
+    command = [*RERUN, "rrd", "merge", *map(str, recordings), "-o", str(part)]
+    merged = subprocess.run(command, capture_output=True, text=True, check=False)
+    if merged.returncode:
+        part.unlink(missing_ok=True)
+        raise Unmerged(save, len(recordings), " ".join(merged.stderr.split())[-300:])
+    part.replace(save)
+
+
+def _name(file: Place) -> str:
+    return str(file).rpartition("/")[2].removesuffix(".part")
+
+
+def _check(file: Place) -> None:
+    if not _name(file).endswith((".mcap", ".rrd")):
+        raise UnknownRecording(Path(file))
+    if isinstance(file, str):
+        # Whether a store has an episode shows when that is opened; a run is no such file.
+        if not file.endswith(".mcap"):
+            raise MissingPath(file, "recording", "copy it to this machine, and play the copy")
+        return
     if not file.is_file():
         hint = "`dnet inspect ls DIRECTORY` lists what was recorded"
         if (part := file.with_name(file.name + ".part")).is_file():

@@ -1,24 +1,34 @@
-"""An episode shown again: its frames logged to a Rerun recording with the layout of a run."""
+"""An episode shown again: its frames in a Rerun recording with the layout of a run."""
 
-from collections.abc import Callable, Mapping, Sequence
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
+from jaxtyping import Float64
 
 from dnet.errors import BadEpisode
-from dnet.geometry.chamfer import chamfer
+from dnet.geometry.chamfer_to import ChamferTo
 from dnet.recorders.blueprint import (
     RECORDING_APPLICATION,
     SERVO_APPLICATION,
+    Company,
     recording_blueprint,
     servo_blueprint,
 )
-from dnet.recorders.rerun_scene import CHAMFER, RerunScene
-from dnet.types import Cloud, EpisodeMeta, Frame, Place, Transform
+from dnet.recorders.frame_columns import COUNTER, Block, FrameColumns
+from dnet.recorders.keypoints import log_keypoint, log_rest_shape
+from dnet.recorders.rerun_scene import RerunScene
+from dnet.types import Cloud, EpisodeMeta, Frame, Place, Point, Transform
 
 URDF = "psm.urdf"
+JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
+"""Of one arm, in the order of the format."""
+FRAMES_AT_A_TIME = 64
+"""Frames in memory at a time: an episode may be longer than that is large."""
 
 
 @runtime_checkable
@@ -68,102 +78,141 @@ class RecordedEpisode(Protocol):
         ...
 
 
-OpenEpisode = Callable[[Path], RecordedEpisode]
+OpenEpisode = Callable[[Place], RecordedEpisode]
 
 
-def replay(episode: RecordedEpisode, path: Path) -> float:
+def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "alone") -> float:
     """Write `episode` as the Rerun recording `path`; return the time that shows it best.
 
-    A servo run shows its goal. A recording has none: its last shape stands in for it, green and
-    labelled so, and the arrow is the motion of the grasp since the rest shape.
+    A servo run shows its goal, and the motion that was asked for as an arrow. A recording has
+    neither: it shows its rest shape, and the motion of the grasp since. The same episode always
+    becomes a recording of the same id, so that a viewer that opens it twice has it once.
+
+    Args:
+        episode: What to show.
+        path: The `.rrd` to write.
+        company: What its layout is for; None brings none along, for where several are opened
+            together, one layout does for all of an application.
 
     Raises:
         BadEpisode: If a part of the episode cannot be read.
     """
     goal = episode.goal()
-    recording = rr.RecordingStream(RECORDING_APPLICATION if goal is None else SERVO_APPLICATION)
+    recording = rr.RecordingStream(
+        application(episode), recording_id=_recording_id(episode.path, episode.meta.episode_id)
+    )
     # When it was replayed says nothing of when it was recorded.
     recording.set_log_time_enabled(False)
     try:
-        layout = recording_blueprint() if goal is None else servo_blueprint()
-        recording.save(path, default_blueprint=layout)
+        recording.save(path, default_blueprint=_layout(goal, company))
         recording.send_recording_name(episode.meta.episode_id)
         scene = _scene(recording, episode)
-        frames = [episode.frame(index) for index in range(len(episode))]
-        if goal is not None:
-            _log_frames(scene, episode, frames, goal)
-            _log_steps(scene, episode, frames)
-        elif frames:
-            last = frames[_last_shape(frames)].cloud
-            _log_frames(scene, episode, frames, last, label="last shape")
-            _log_motions(scene, frames)
-        for time, text in episode.lines():
-            scene.set_time(time)
-            scene.log_text(text)
+        scene.name_joints(JOINT_NAMES)
+        log_keypoint(recording, "hold", np.array(episode.meta.scene.hold))
+        columns = FrameColumns(recording)
+        columns.send_lines(episode.lines())
+        if goal is None:
+            return _replay_shapes(episode, recording, columns)
+        scene.log_goal(goal)
+        return _replay_run(episode, scene, columns, goal)
     finally:
         recording.flush()
         recording.disconnect()
-    return _best_time(frames, servo=goal is not None)
+
+
+def application(episode: RecordedEpisode) -> str:
+    """Return the application that an episode is a recording of."""
+    return RECORDING_APPLICATION if episode.goal() is None else SERVO_APPLICATION
+
+
+def _layout(goal: Cloud | None, company: Company | None) -> rrb.Blueprint | None:
+    if company is None:
+        return None
+    if goal is None:
+        return recording_blueprint(company=company)
+    return servo_blueprint(gripper=True, company=company)
+
+
+def _replay_shapes(
+    episode: RecordedEpisode, recording: rr.RecordingStream, columns: FrameColumns
+) -> float:
+    """Send a recording; return the time of its largest motion."""
+    if not len(episode):
+        return 0.0
+    rest = episode.frame(0)
+    log_rest_shape(recording, rest.cloud)
+    distance = ChamferTo(rest.cloud) if len(rest.cloud) else None
+    best, largest = rest.time, 0.0
+    for block in _blocks(episode):
+        columns.send_frames(block)
+        columns.send_motions(block, rest.grasp)
+        if distance is not None:
+            columns.send_distances(block, distance)
+        for one in block.frames:
+            length = float(np.linalg.norm(one.grasp - rest.grasp))
+            if length > largest:
+                best, largest = one.time, length
+    return best
+
+
+def _replay_run(
+    episode: RecordedEpisode, scene: RerunScene, columns: FrameColumns, goal: Cloud
+) -> float:
+    """Send a servo run; return the time of its end."""
+    distance = ChamferTo(goal) if len(goal) else None
+    seen: dict[float, tuple[int, Point]] = {}
+    for block in _blocks(episode):
+        columns.send_frames(block)
+        if distance is not None:
+            columns.send_distances(block, distance)
+        for index, one in enumerate(block.frames, start=block.first):
+            seen[one.time] = index, one.grasp
+    for step in episode.steps():
+        if step["time"] in seen:
+            index, grasp = seen[step["time"]]
+            scene.set_time(step["time"], count=index)
+            scene.log_motion(grasp, np.array(step["motion"], dtype=np.float64))
+            scene.log_tip_path(_planned(episode, step, grasp))
+    return max(seen, default=0.0)
+
+
+def _blocks(episode: RecordedEpisode) -> Iterator[Block]:
+    for first in range(0, len(episode), FRAMES_AT_A_TIME):
+        numbers = range(first, min(first + FRAMES_AT_A_TIME, len(episode)))
+        yield Block(
+            first,
+            [episode.frame(number) for number in numbers],
+            [episode.transforms(number) for number in numbers],
+        )
+
+
+def _planned(
+    episode: RecordedEpisode, step: Mapping[str, Any], grasp: Point
+) -> Float64[np.ndarray, "2 3"] | None:
+    """Return where the tip was planned to go: both ends of its path, all that an episode keeps."""
+    plan = step.get("plan")
+    if plan is None:
+        return None
+    try:
+        if plan["status"] == "failed":
+            return None
+        achieved = np.array(plan["achieved"], dtype=np.float64).reshape(3)
+    except (KeyError, TypeError, ValueError) as error:
+        why = f"has an unreadable plan at {step['time']:g} s ({error})"
+        raise BadEpisode(episode.path, why, "record it again") from error
+    return np.stack([grasp, grasp + achieved])
+
+
+def _recording_id(path: Place, episode: str) -> str:
+    # Where it lies, too: two datasets of one seed have episodes of the same names.
+    place = path if isinstance(path, str) else path.resolve()
+    return hashlib.sha256(f"{episode}\n{place}".encode()).hexdigest()[:32]
 
 
 def _scene(recording: rr.RecordingStream, episode: RecordedEpisode) -> RerunScene:
     urdf = episode.attachment(URDF) if URDF in episode.attachments else b""
     try:
-        return RerunScene(recording, urdf=urdf.decode(), counter="frame")
+        return RerunScene(recording, urdf=urdf.decode(), counter=COUNTER)
     except (ValueError, RuntimeError) as error:
         why = f"has an unreadable attachment {URDF} ({error})"
         raise BadEpisode(episode.path, why, "record it again") from error
-
-
-def _log_frames(
-    scene: RerunScene,
-    episode: RecordedEpisode,
-    frames: Sequence[Frame],
-    goal: Cloud,
-    *,
-    label: str = "goal",
-) -> None:
-    scene.log_goal(goal, label=label)
-    for index, frame in enumerate(frames):
-        scene.set_time(frame.time, count=index)
-        scene.log_frame(frame, episode.transforms(index))
-        if frame.kind != "way" and len(goal) and len(frame.cloud):
-            scene.log_scalar(CHAMFER, 1e3 * chamfer(frame.cloud, goal))
-
-
-def _log_motions(scene: RerunScene, frames: Sequence[Frame]) -> None:
-    rest = frames[0].grasp
-    for index, frame in enumerate(frames):
-        scene.set_time(frame.time, count=index)
-        scene.log_motion(rest, frame.grasp - rest)
-
-
-def _log_steps(scene: RerunScene, episode: RecordedEpisode, frames: Sequence[Frame]) -> None:
-    at = {frame.time: (index, frame.grasp) for index, frame in enumerate(frames)}
-    for step in episode.steps():
-        if step["time"] in at:
-            index, grasp = at[step["time"]]
-            scene.set_time(step["time"], count=index)
-            scene.log_motion(grasp, np.array(step["motion"], dtype=np.float64))
-
-
-def _last_shape(frames: Sequence[Frame]) -> int:
-    """Return the last frame that had settled, or the last of all."""
-    settled = [index for index, frame in enumerate(frames) if frame.kind != "way"]
-    return settled[-1] if settled else len(frames) - 1
-
-
-def _best_time(frames: Sequence[Frame], *, servo: bool) -> float:
-    """Return when there is most to see: a servo run's end, a recording's largest motion.
-
-    The last shape of a recording stands for the goal and would hide behind itself, so another
-    frame is chosen if there is one.
-    """
-    if not frames:
-        return 0.0
-    if servo or len(frames) == 1:
-        return frames[-1].time
-    last = _last_shape(frames)
-    others = [frame for index, frame in enumerate(frames) if index != last]
-    rest = frames[0].grasp
-    return max(others, key=lambda frame: float(np.linalg.norm(frame.grasp - rest))).time

@@ -10,6 +10,7 @@ from dnet.commands.inspect_diff import Diff
 from dnet.commands.inspect_filter import Filter
 from dnet.commands.inspect_material import Material
 from dnet.commands.inspect_merge import Merge
+from dnet.commands.inspect_plot import Plot
 from dnet.commands.inspect_repair import Repair
 from dnet.commands.inspect_split import Split
 from dnet.commands.inspect_stats import Stats
@@ -99,6 +100,7 @@ class Inspect:
         Annotated[List, tyro.conf.subcommand("ls")]
         | Annotated[Info, tyro.conf.subcommand("info")]
         | Annotated[Stats, tyro.conf.subcommand("stats")]
+        | Annotated[Plot, tyro.conf.subcommand("plot")]
         | Annotated[Validate, tyro.conf.subcommand("validate")]
         | Annotated[Repair, tyro.conf.subcommand("repair")]
         | Annotated[Merge, tyro.conf.subcommand("merge")]

@@ -1,7 +1,8 @@
-"""`dnet play`: recordings in the Rerun viewer, or as a picture."""
+"""`dnet play`: recordings in the Rerun viewer, as a picture, or as a file for another machine."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -10,34 +11,63 @@ import tyro
 class Play:
     """Play episodes and servo runs back in Rerun, or draw a picture of one without a screen.
 
-    The view shows the object (blue), its goal (green), both arms, the motion that was asked for
-    (arrow), and curves of shape distance, motion and joints. An episode without a goal shows
-    its last shape in the goal's place.
+    The view shows the object (blue), both arms, and curves of shape distance, motion, gripper and
+    joints. A servo run shows its goal (green), the motion that was asked for (arrow) and where
+    the tip was planned to go; its .rrd shows the whole path. A recording shows its rest shape
+    (grey) and how far the grasp has moved since (arrow).
+
+    A directory opens its episodes side by side, each under its id in the list at the left of the
+    window. --episode and --filter choose among them: --filter opens the episodes with a frame for
+    which a condition holds, and takes SQL as `dnet inspect filter` does.
+
+    Example: dnet play data/box --episode 3,7 --episode episode-0-00012
+
+    Example: dnet play data/box --filter "kind = 'shape' and motion_mm > 80"
 
     Example: dnet play runs/servo/run.rrd --screenshot run.png
     """
 
-    files: tyro.conf.Positional[tuple[Path, ...]]
-    """Episodes (`.mcap`) and runs (`.rrd`); unfinished ones (`.part`) play too."""
+    files: Annotated[
+        tyro.conf.Positional[tuple[str | Path, ...]], tyro.conf.arg(metavar="FILE|DIRECTORY|URL")
+    ]
+    """Episodes (`.mcap`) and runs (`.rrd`), unfinished ones (`.part`) too, and directories of
+    episodes."""
+    episode: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ID")] = ()
+    """Of a directory, open these alone: ids, or numbers of pairs; with commas or repeated."""
+    filter: Annotated[str | None, tyro.conf.arg(metavar="SQL")] = None
+    """Of a directory, open the episodes with a frame for which this holds."""
+    limit: int = 20
+    """Of each directory, open so many episodes at most; the rest is said in a line."""
     screenshot: Path | None = None
-    """Draw the first file into this PNG instead of opening a window."""
+    """Draw the first of them into this PNG instead of opening a window."""
     save: Path | None = None
-    """Write the first file as this Rerun recording (`.rrd`) instead of opening a window."""
+    """Write all of them as one Rerun recording (`.rrd`) instead of opening a window."""
     at: float | None = None
     """When to draw the picture, in seconds of simulation; left out, the end of a servo run, or
-    an episode's largest motion."""
+    a recording's largest motion."""
 
     def run(self) -> None:
-        """Show the files."""
+        """Show the recordings, with a progress bar while they are made ready.
+
+        Raises:
+            DnetError: If one of them is missing or unreadable, or none is chosen.
+        """
+        from rich.console import Console
+
+        from dnet.commands.index_bar import reading
+        from dnet.commands.playlist import Choice, playlist
         from dnet.datasets.reader import EpisodeReader
         from dnet.recorders.playback import play
 
+        console = Console(stderr=True)
+        wanted = [one.strip() for some in self.episode for one in some.split(",") if one.strip()]
         play(
-            self.files,
+            playlist(self.files, Choice(wanted, self.filter, self.limit), console),
             open_episode=EpisodeReader,
             screenshot=self.screenshot,
             save=self.save,
             seconds=self.at,
+            watched=reading(console),
         )
         for written in (self.screenshot, self.save):
             if written is not None:

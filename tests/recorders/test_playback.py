@@ -1,17 +1,30 @@
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from rerun.chunk import RrdReader
 
 from dnet.datasets.reader import EpisodeReader
-from dnet.errors import BadEpisode, MissingPath, NoPicture, OccupiedOutput, TooFew, UnknownRecording
-from dnet.recorders.playback import play
+from dnet.errors import (
+    BadEpisode,
+    MissingPath,
+    NoPicture,
+    OccupiedOutput,
+    TooFew,
+    UnknownRecording,
+    Unmerged,
+)
+from dnet.recorders.episode import EpisodeWriter
+from dnet.recorders.playback import Progress, play
 from dnet.recorders.replay import RecordedEpisode
 from dnet.recorders.rerun_run import RerunRun
 from dnet.sim.urdf import psm_urdf
-from tests.recorders.rollout import ARMS, frames, step, write, write_servo
+from dnet.types import Place
+from tests.recorders.rollout import ARMS, frames, meta, step, write, write_servo
 from tests.recorders.rrd import rows
 
 Box = tuple[float, float, float, float]
@@ -36,9 +49,17 @@ STEEL = (110, 110, 110), (240, 240, 240)
 
 
 def test_a_picture_shows_the_object_the_goal_and_both_arms(tmp_path: Path) -> None:
-    episode = write(tmp_path / "a.mcap", frames(3, points=1024))
+    seen = frames(3, points=1024)
+    attachments = {"psm.urdf": psm_urdf().encode()}
+    with EpisodeWriter(
+        tmp_path / "a.mcap", meta("a"), arms=ARMS, attachments=attachments
+    ) as writer:
+        writer.set_goal(seen[-1].cloud)
+        for index, one in enumerate(seen[:3:2]):
+            writer.add_step(step(one, seen[-1]), index)
+        writer.finish({})
     picture = tmp_path / "new" / "a.png"
-    play([episode], open_episode=EpisodeReader, screenshot=picture)
+    play([tmp_path / "a.mcap"], open_episode=EpisodeReader, screenshot=picture)
     assert share(picture, *BLUE, SCENE) > 0.005
     assert share(picture, *GREEN, SCENE) > 0.005
     assert share(picture, *STEEL, UPPER_LEFT) > 0.01
@@ -51,6 +72,41 @@ def test_a_saved_recording_holds_the_episode(tmp_path: Path) -> None:
     saved = tmp_path / "new" / "a.rrd"
     play([write(tmp_path / "a.mcap", seen)], open_episode=EpisodeReader, save=saved)
     assert len(rows(saved, "/cloud/current", "Points3D:positions", timeline="frame")) == len(seen)
+
+
+def test_several_episodes_are_saved_as_recordings_of_one_application_with_one_layout(
+    tmp_path: Path,
+) -> None:
+    files = [write(tmp_path / f"{name}.mcap", frames(2)) for name in "abc"]
+    told: list[tuple[int, int]] = []
+
+    @contextmanager
+    def watched() -> Iterator[Progress]:
+        yield lambda done, total: told.append((done, total))
+
+    play(
+        # The same file twice is one recording.
+        [*files, files[0]],
+        open_episode=EpisodeReader,
+        save=tmp_path / "all.rrd",
+        watched=watched(),
+    )
+    found = RrdReader(tmp_path / "all.rrd")
+    assert [entry.application_id for entry in found.recordings()] == ["dnet record"] * 3
+    assert len({entry.recording_id for entry in found.recordings()}) == 3
+    assert [entry.application_id for entry in found.blueprints()] == ["dnet record"]
+    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_recordings_that_rerun_does_not_merge_leave_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    files = [write(tmp_path / f"{name}.mcap", frames(1)) for name in "ab"]
+    monkeypatch.setenv("RERUN_CLI_PATH", "/bin/false")
+    with pytest.raises(Unmerged, match=r"could not write 2 recordings into .*all\.rrd"):
+        play(files, open_episode=EpisodeReader, save=tmp_path / "all.rrd")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "b.mcap"]
 
 
 def test_an_existing_recording_is_not_overwritten(tmp_path: Path) -> None:
@@ -93,7 +149,7 @@ def test_what_a_killed_run_left_plays_too(tmp_path: Path) -> None:
 def test_an_episode_is_closed_whatever_comes(tmp_path: Path) -> None:
     opened: list[EpisodeReader] = []
 
-    def open_episode(path: Path) -> RecordedEpisode:
+    def open_episode(path: Place) -> RecordedEpisode:
         opened.append(EpisodeReader(path))
         return opened[-1]
 
@@ -140,6 +196,11 @@ def test_a_missing_file_is_named_and_its_unfinished_one_is_offered(tmp_path: Pat
     (tmp_path / "a.mcap.part").touch()
     with pytest.raises(MissingPath, match=r"did not finish; play what there is of it as .*\.part"):
         play([tmp_path / "a.mcap"], open_episode=EpisodeReader)
+
+
+def test_a_run_behind_a_url_is_refused_with_a_way_out() -> None:
+    with pytest.raises(MissingPath, match="copy it to this machine"):
+        play(["s3://bucket/run.rrd"], open_episode=EpisodeReader)
 
 
 @pytest.mark.parametrize(

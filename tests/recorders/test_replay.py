@@ -1,13 +1,17 @@
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BadEpisode
 from dnet.geometry.chamfer import chamfer
+from dnet.recorders.blueprint import Company
 from dnet.recorders.episode import EpisodeWriter
-from dnet.recorders.replay import replay
+from dnet.recorders.replay import FRAMES_AT_A_TIME, replay
 from tests.recorders.rollout import ARMS, frame, frames, meta, write, write_servo
 from tests.recorders.rrd import entities, rows
 
@@ -16,6 +20,11 @@ def replayed(episode: Path) -> tuple[Path, float]:
     target = episode.with_suffix(".rrd")
     with EpisodeReader(episode) as reader:
         return target, replay(reader, target)
+
+
+def identity(path: Path) -> str:
+    (name,) = [entry.recording_id for entry in RrdReader(path).recordings()]
+    return str(name)
 
 
 def test_every_frame_is_replayed_at_its_time(tmp_path: Path) -> None:
@@ -31,16 +40,62 @@ def test_every_frame_is_replayed_at_its_time(tmp_path: Path) -> None:
     )
 
 
-def test_the_last_shape_stands_for_the_goal_of_a_recording(tmp_path: Path) -> None:
-    seen = [*frames(3), frame(9.0, np.zeros(3), "way")]
+def test_a_long_episode_is_replayed_whole(tmp_path: Path) -> None:
+    seen = frames(FRAMES_AT_A_TIME // 2 + 3, points=8)
+    assert len(seen) > FRAMES_AT_A_TIME
     path, _ = replayed(write(tmp_path / "a.mcap", seen))
-    ((_, goal),) = rows(path, "/cloud/goal", "Points3D:positions", timeline=None)
-    np.testing.assert_array_equal(goal, seen[-2].cloud)
-    ((_, label),) = rows(path, "/cloud/goal/label", "Points3D:labels", timeline=None)
-    assert label == ["last shape"]
+    for entity, component in (
+        ("/cloud/current", "Points3D:positions"),
+        ("/manipulation_point", "Points3D:positions"),
+        ("/joints/psm_right", "Scalars:scalars"),
+        ("/tf/psm_right/tip_link", "Transform3D:translation"),
+        ("/motion", "Arrows3D:vectors"),
+    ):
+        counts = [count for count, _ in rows(path, entity, component, timeline="frame")]
+        assert counts == list(range(len(seen)))
+        times = [time for time, _ in rows(path, entity, component, timeline="sim_time")]
+        assert times == [one.time for one in seen]
 
 
-def test_curves_of_a_recording_are_distances_from_goal_and_rest(tmp_path: Path) -> None:
+def test_the_arms_stand_where_they_stood(tmp_path: Path) -> None:
+    seen = frames(2)
+    path, _ = replayed(write(tmp_path / "a.mcap", seen))
+    for link in ("psm_left/yaw_link", "psm_right/tip_link"):
+        places = rows(path, f"/tf/{link}", "Transform3D:translation", timeline="frame")
+        turns = rows(path, f"/tf/{link}", "Transform3D:quaternion", timeline="frame")
+        for one, (_, (place,)), (_, (turn,)) in zip(seen, places, turns, strict=True):
+            (told,) = [entry for entry in ARMS.transforms(one.joints) if entry.child == link]
+            np.testing.assert_allclose(place, told.translation, atol=1e-6)
+            np.testing.assert_allclose(turn, told.rotation, atol=1e-6)
+
+
+def test_a_recording_shows_its_rest_shape_and_the_point_that_is_held(tmp_path: Path) -> None:
+    seen = frames(3)
+    path, _ = replayed(write(tmp_path / "a.mcap", seen))
+    ((_, rest),) = rows(path, "/cloud/rest", "Points3D:positions", timeline=None)
+    np.testing.assert_array_equal(rest, seen[0].cloud)
+    ((_, label),) = rows(path, "/cloud/rest/label", "Points3D:labels", timeline=None)
+    assert label == ["rest shape"]
+    ((_, (hold,)),) = rows(path, "/keypoints/hold", "Points3D:positions", timeline=None)
+    np.testing.assert_allclose(hold, meta().scene.hold, atol=1e-7)
+    assert "/cloud/goal" not in entities(path)
+
+
+def test_curves_tell_where_the_gripper_and_the_joints_are(tmp_path: Path) -> None:
+    seen = frames(3)
+    path, _ = replayed(write(tmp_path / "a.mcap", seen))
+    gripper = rows(path, "/gripper", "Scalars:scalars", timeline="sim_time")
+    np.testing.assert_allclose([value for _, value in gripper], [1e3 * one.grasp for one in seen])
+    for number, arm in enumerate(("psm_left", "psm_right")):
+        joints = rows(path, f"/joints/{arm}", "Scalars:scalars", timeline="sim_time")
+        np.testing.assert_allclose(
+            [value for _, value in joints], [one.joints[number] for one in seen]
+        )
+        ((_, names),) = rows(path, f"/joints/{arm}", "SeriesLines:names", timeline=None)
+        assert names == [f"{arm} {joint}" for joint in ARMS.joint_names]
+
+
+def test_curves_of_a_recording_are_distances_from_rest(tmp_path: Path) -> None:
     seen = frames(3)
     path, _ = replayed(write(tmp_path / "a.mcap", seen))
     settled = [one for one in seen if one.kind != "way"]
@@ -48,7 +103,7 @@ def test_curves_of_a_recording_are_distances_from_goal_and_rest(tmp_path: Path) 
     assert [time for time, _ in chamfers] == [one.time for one in settled]
     np.testing.assert_allclose(
         [value for _, (value,) in chamfers],
-        [1e3 * chamfer(one.cloud, seen[-1].cloud) for one in settled],
+        [1e3 * chamfer(one.cloud, seen[0].cloud) for one in settled],
     )
     motions = rows(path, "/motion_length", "Scalars:scalars", timeline="sim_time")
     np.testing.assert_allclose(
@@ -68,12 +123,68 @@ def test_a_servo_run_shows_its_goal_and_its_steps(tmp_path: Path) -> None:
     np.testing.assert_allclose(arrows[0][1][0], seen[-1].grasp - seen[0].grasp, atol=1e-7)
     lines = [text for _, (text,) in rows(path, "/log", "TextLog:text", timeline="sim_time")]
     assert [line[:6] for line in lines] == ["step 0", "step 1", "step 2"]
+    chamfers = rows(path, "/chamfer", "Scalars:scalars", timeline="sim_time")
+    np.testing.assert_allclose(
+        [value for _, (value,) in chamfers],
+        [1e3 * chamfer(one.cloud, seen[-1].cloud) for one in seen[::2]],
+    )
 
 
-def test_a_recording_is_best_seen_where_the_motion_is_largest_but_not_at_its_end(
-    tmp_path: Path,
-) -> None:
-    motions = [0.0, 0.01, 0.03, 0.02, 0.04]
+def test_a_plan_shows_where_the_tip_was_to_go_until_there_is_none(tmp_path: Path) -> None:
+    seen = frames(3)
+    path, _ = replayed(write_servo(tmp_path / "run.mcap"))
+    planned = rows(path, "/plan/tip", "LineStrips3D:strips", timeline="sim_time")
+    assert [time for time, _ in planned] == [0.0, 1.0]
+    for one, (_, (strip,)) in zip(seen[::2], planned, strict=False):
+        np.testing.assert_allclose(strip, [one.grasp, seen[-1].grasp], atol=1e-7)
+    cleared = rows(path, "/plan/tip", "Clear:is_recursive", timeline="sim_time")
+    assert [time for time, _ in cleared] == [2.0]
+
+
+@pytest.mark.parametrize("plan", [{}, {"status": "straight", "achieved": [1.0]}, 3])
+def test_an_unreadable_plan_is_named(tmp_path: Path, plan: object) -> None:
+    class Spoilt(EpisodeReader):
+        def steps(self) -> list[dict[str, Any]]:
+            return [step | {"plan": plan} for step in super().steps()]
+
+    with (
+        Spoilt(write_servo(tmp_path / "run.mcap")) as episode,
+        pytest.raises(BadEpisode, match=r"run\.mcap has an unreadable plan at 0 s"),
+    ):
+        replay(episode, tmp_path / "run.rrd")
+
+
+def test_an_episode_is_always_the_same_recording_and_no_other_one_is(tmp_path: Path) -> None:
+    one = write(tmp_path / "one" / "a.mcap", frames(1))
+    (tmp_path / "link").symlink_to(tmp_path / "one")
+    first = identity(replayed(one)[0])
+    assert identity(replayed(tmp_path / "link" / "a.mcap")[0]) == first
+    others = [
+        write(tmp_path / "one" / "b.mcap", frames(1)),
+        write(tmp_path / "two" / "a.mcap", frames(1)),
+        write(tmp_path / "one" / "c.mcap", frames(1), name="a"),
+    ]
+    assert len({first, *(identity(replayed(other)[0]) for other in others)}) == 4
+
+
+@pytest.mark.parametrize("company", ["alone", "several", None])
+def test_a_recording_brings_one_layout_or_none(tmp_path: Path, company: Company | None) -> None:
+    with EpisodeReader(write(tmp_path / "a.mcap", frames(1))) as episode:
+        replay(episode, tmp_path / "a.rrd", company=company)
+    laid_out = [entry.application_id for entry in RrdReader(tmp_path / "a.rrd").blueprints()]
+    assert laid_out == ([] if company is None else ["dnet record"])
+
+
+def test_a_frame_in_which_nothing_was_seen_is_replayed_too(tmp_path: Path) -> None:
+    seen = frames(2)
+    seen[1] = replace(seen[1], cloud=np.zeros((0, 3), np.float32))
+    path, _ = replayed(write(tmp_path / "a.mcap", seen))
+    clouds = rows(path, "/cloud/current", "Points3D:positions", timeline="frame")
+    assert [len(cloud) for _, cloud in clouds] == [64, 0, 64]
+
+
+def test_a_recording_is_best_seen_where_the_motion_is_largest(tmp_path: Path) -> None:
+    motions = [0.0, 0.01, 0.03, 0.02, 0.01]
     seen = [frame(float(time), np.array([0.0, 0.0, up])) for time, up in enumerate(motions)]
     _, best = replayed(write(tmp_path / "a.mcap", seen))
     assert best == 2.0
