@@ -515,9 +515,19 @@ class ClashingEpisodes(DnetError, ValueError):
     """Different episodes that one dataset cannot tell apart."""
 
     def __init__(self, what: str, name: str, paths: list[str]) -> None:
+        apart = "rename one" if what == "name" else "record one of them with another --seed"
         super().__init__(
             f"{' and '.join(paths)} are different, but have one {what}: {name}; keep them in "
-            "folders of their own, or record one of them with another --seed"
+            f"folders of their own, or {apart}"
+        )
+
+
+class UnlikePaths(DnetError, ValueError):
+    """A file and a directory that were to be compared."""
+
+    def __init__(self, folder: Path, file: Path) -> None:
+        super().__init__(
+            f"{folder} is a directory and {file} is a file; compare two episodes or two directories"
         )
 
 

@@ -1,7 +1,8 @@
 """How two episodes, or two datasets, differ."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from filecmp import cmp
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from jaxtyping import Float
 
 from dnet.datasets.index import Index
 from dnet.datasets.reader import EpisodeReader
+from dnet.tools.difference_messages import differing_messages
 from dnet.types import Frame
 
 FRAME_COLUMNS = {
@@ -26,6 +28,8 @@ FRAME_COLUMNS = {
 points of one row, of the grasps, between nodes of one number (null where there are not as many),
 and between joint positions in radians or metres."""
 FILE_COLUMNS = {"file": pl.String, "difference": pl.String}
+PACKED = "packed in another way, with the same content"
+"""The one difference of files that is none of episodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +41,14 @@ class EpisodeDifference:
     """What is known of them as a whole and differs, by dotted name, of the one and of the other."""
     frames: pl.DataFrame
     """A row for each frame that differs; columns as in `FRAME_COLUMNS`."""
+    messages: Mapping[str, int] = field(default_factory=dict)
+    """Topics and metadata of which a message differs, each with the number of the first: also what
+    frames are not made of, such as goals, steps, images and lines."""
 
     @property
     def same(self) -> bool:
         """Whether they say the same, perhaps in files that are packed in another way."""
-        return not self.facts and not self.frames.height
+        return not (self.facts or self.frames.height or self.messages)
 
 
 def compare_episodes(one: Path, other: Path) -> EpisodeDifference:
@@ -50,8 +57,11 @@ def compare_episodes(one: Path, other: Path) -> EpisodeDifference:
     Raises:
         MissingPath: If one of them does not exist.
         BadEpisode: If one of them cannot be read.
+        BrokenRecord: If one of them is damaged where its index does not lead.
     """
     with EpisodeReader(one) as first, EpisodeReader(other) as second:
+        if cmp(one, other, shallow=False):
+            return EpisodeDifference(True, {}, pl.DataFrame(schema=FRAME_COLUMNS))
         facts = _unequal(_facts(first), _facts(second))
         rows = [
             row
@@ -59,7 +69,7 @@ def compare_episodes(one: Path, other: Path) -> EpisodeDifference:
             if (row := _compare_frames(index, first.frame(index), second.frame(index))) is not None
         ]
     frames = pl.DataFrame(rows, schema=FRAME_COLUMNS, orient="row")
-    return EpisodeDifference(one.read_bytes() == other.read_bytes(), facts, frames)
+    return EpisodeDifference(False, facts, frames, differing_messages(one, other))
 
 
 def compare_datasets(one: Index, other: Index) -> pl.DataFrame:
@@ -78,13 +88,15 @@ def compare_datasets(one: Index, other: Index) -> pl.DataFrame:
 def _file_difference(row: Mapping[str, Any], one: Index, other: Index) -> str:
     if row["note"] is None or row["note_right"] is None:
         return f"only in {(other if row['note'] is None else one).root}"
+    paths = Path(one.path(row["name"])), Path(other.path(row["name"]))
     broken = [index for index, note in ((one, row["note"]), (other, row["note_right"])) if note]
+    if broken and cmp(*paths, shallow=False):
+        return ""
     if broken:
         return f"cannot be read in {' and '.join(str(index.root) for index in broken)}"
     if row["sha256"] == row["sha256_right"]:
         return ""
-    found = compare_episodes(Path(one.path(row["name"])), Path(other.path(row["name"])))
-    return first_difference(found)
+    return first_difference(compare_episodes(*paths))
 
 
 def first_difference(found: EpisodeDifference) -> str:
@@ -103,7 +115,9 @@ def first_difference(found: EpisodeDifference) -> str:
     if found.facts:
         name, (one, other) = next(iter(found.facts.items()))
         return f"{name}: {one} and {other}"
-    return "packed in another way, with the same content"
+    for name, number in found.messages.items():
+        return f"{name}: from message {number} on"
+    return PACKED
 
 
 def _facts(episode: EpisodeReader) -> dict[str, Any]:

@@ -27,7 +27,7 @@ def matching_frames(index: Index, condition: str) -> pl.DataFrame:
     try:
         return frames.filter(pl.sql_expr(condition))
     except PolarsError as error:
-        why = str(error).partition("\n")[0]
+        why = str(error).partition("\n")[0].partition("; valid columns")[0]
         raise BadCondition(condition, why, frames.columns) from error
 
 

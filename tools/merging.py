@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from dnet.datasets.index import Index
-from dnet.errors import BadEpisode, ClashingEpisodes
+from dnet.errors import BadEpisode, ClashingEpisodes, NoEpisodes
 from dnet.tools.placing import place_episodes
 
 
@@ -45,6 +45,7 @@ def merge_datasets(
 
     Raises:
         BadEpisode: If a file cannot be read.
+        NoEpisodes: If none can, and such files are left out.
         ClashingEpisodes: If two different episodes have one id, or two files one name.
         OccupiedOutput: If the new folder already holds episodes.
         Unwritten: If nothing can be written there.
@@ -58,12 +59,14 @@ def merge_datasets(
             )
             for index in indexes
         ]
-    )
+    ).with_row_index("row")
     broken = files.filter(pl.col("note") != "")
     if broken.height and not skip_broken:
         path, why = broken.select("path", "note").row(0)
         raise BadEpisode(Path(path), why, "repair or remove it, or leave such files out")
     readable = files.filter(pl.col("note") == "")
+    if not readable.height:
+        raise NoEpisodes(indexes[0].root, "holds no .mcap episode that can be read")
     single = readable.unique("sha256", keep="first", maintain_order=True)
     for column in ("episode", "name"):
         clash = single.filter(pl.col(column).is_duplicated()).sort(column, maintain_order=True)
@@ -71,5 +74,6 @@ def merge_datasets(
             raise ClashingEpisodes(column, clash[column][0], clash["path"][:2].to_list())
     sources = {name: Path(path) for name, path in single.select("name", "path").iter_rows()}
     place_episodes(sources, out, copy=copy, on_file=on_file)
-    repeated = readable.filter(~pl.col("path").is_in(single["path"].to_list()))
+    # By row and not by path: somebody may give one folder twice.
+    repeated = readable.filter(~pl.col("row").is_in(single["row"].to_list()))
     return Merged(single.height, tuple(repeated["path"]), tuple(broken["path"]))

@@ -4,10 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import polars as pl
+
+from dnet.datasets.frame_table import SETTLED
 from dnet.datasets.index import Index
 from dnet.datasets.split import split
 from dnet.errors import TooFew
-from dnet.tools.placing import place_episodes
+from dnet.tools.placing import place_episodes, refuse_occupied
 
 SIDES = ("training", "validation")
 
@@ -32,8 +35,9 @@ def split_dataset(
 ) -> tuple[Side, Side]:
     """Put the episodes to learn from and those to judge by into folders of their own.
 
-    An episode's side depends on the hash of its id alone, so the sides are those that `dnet train`
-    makes with the same fraction and seed.
+    The sides are those that `dnet train` makes with the same fraction and seed. It goes by the
+    episodes with two settled frames or more; one with fewer has no pair to judge a network by, and
+    lies with those to learn from.
 
     Args:
         index: Of a dataset in a folder; files that cannot be read are left out.
@@ -45,19 +49,28 @@ def split_dataset(
 
     Raises:
         NotAFraction: If `fraction` is not from 0 to 1.
-        TooFew: If there are fewer than two episodes.
+        TooFew: If fewer than two episodes have a pair of settled frames.
         OccupiedOutput: If one of the folders already holds episodes.
         Unwritten: If nothing can be written there.
     """
     readable = index.files.filter(index.files["note"] == "")
-    ids = sorted(set(readable["episode"]))
+    ids = _paired(index)
+    _, judged = split(ids, fraction=fraction, seed=seed)
     if len(ids) < 2:
-        raise TooFew(f"number of episodes in {index.root}", len(ids), 2)
-    learned, _ = split(ids, fraction=fraction, seed=seed)
+        raise TooFew(f"number of episodes in {index.root} with two settled frames", len(ids), 2)
+    for name in SIDES:
+        refuse_occupied(out / name)
     sides = []
     for name in SIDES:
-        own = readable.filter(readable["episode"].is_in(learned) == (name == SIDES[0]))
+        own = readable.filter(readable["episode"].is_in(judged) == (name == SIDES[1]))
         files = {file: Path(index.path(file)) for file in own["name"]}
         place_episodes(files, out / name, copy=copy, on_file=on_file)
         sides.append(Side(out / name, own.height, int(own["shapes"].sum())))
     return sides[0], sides[1]
+
+
+def _paired(index: Index) -> list[str]:
+    """Return the ids of the episodes of which a network can learn a motion."""
+    settled = index.frames.filter(pl.col("kind").is_in(SETTLED))
+    paired = settled.group_by("name", "episode").len().filter(pl.col("len") > 1)
+    return paired["episode"].unique().sort().to_list()

@@ -36,12 +36,12 @@ class Filter:
 
         Raises:
             DnetError: If there are no episodes, the condition is none, or the output directory
-                will not do.
+                will not do or would get no episode.
         """
         from rich.console import Console
 
         from dnet.commands.index_bar import read_index
-        from dnet.errors import TooFew
+        from dnet.errors import NothingMatches, TooFew
         from dnet.tools.filtering import episodes_of, matching_frames
         from dnet.tools.placing import place_episodes
         from dnet.tools.tables import print_frame
@@ -52,6 +52,8 @@ class Filter:
         frames = matching_frames(index, self.condition)
         matching = episodes_of(frames)
         if self.out is not None:
+            if not matching.height:
+                raise NothingMatches(self.directory, self.condition, index.frames.height)
             place_episodes({name: self.directory / name for name in matching["name"]}, self.out)
         rows = matching if self.episodes else frames
         if self.csv or self.json:

@@ -53,6 +53,8 @@ class Merge:
             skip_broken=self.skip_broken,
             copy=self.copy,
         )
+        # Whoever uses the new directory next finds it indexed.
+        read_index(self.out, console)
         if self.json:
             print(dumps(asdict(merged), indent=2))
             return

@@ -10,9 +10,10 @@ import tyro
 class Split:
     """Part a dataset into the folders training and validation, as a training would.
 
-    An episode's side depends on its id alone: the sides are those of `dnet train` with the same
-    --validation and --seed, and stay when episodes are added. The files are links, which take no
-    room, where the disk allows it.
+    The sides are those of `dnet train` with the same --validation and --seed, and go by the ids of
+    the episodes. One without two settled frames, of which nothing can be learned, lies in training;
+    files that cannot be read are left out. The files are links, which take no room, where the disk
+    allows it.
 
     Example: dnet inspect split data/box --out data/box-split
     """
@@ -51,5 +52,7 @@ class Split:
         if self.json:
             print(dumps([asdict(side) for side in sides], indent=2, default=str))
             return
+        for name, why in index.broken().select("name", "note").iter_rows():
+            print(f"left out: {index.path(name)} {why}")
         for side in sides:
             print(f"{side.folder}: {side.episodes} episodes, {side.shapes} shapes")

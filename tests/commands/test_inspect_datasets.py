@@ -5,6 +5,8 @@ import pytest
 import tyro
 
 from dnet.commands.inspect import Inspect
+from dnet.datasets.index import FILES, FRAMES
+from dnet.errors import MissingPath, NothingMatches, UnlikePaths
 from tests.datasets.dataset import write_dataset
 
 
@@ -26,6 +28,8 @@ def test_split_then_merge_is_the_same_dataset(
     assert [line.partition(":")[0] for line in out] == [str(side) for side in sides]
     run("merge", *sides, "--out", tmp_path / "merged")
     assert capsys.readouterr().out == f"3 episodes in {tmp_path / 'merged'}\n"
+    assert (tmp_path / "merged" / FILES).exists()
+    assert (tmp_path / "merged" / FRAMES).exists()
     run("diff", data, tmp_path / "merged")
     assert capsys.readouterr().out == "3 files, the same in both\n"
 
@@ -39,6 +43,9 @@ def test_filter_prints_what_matches_and_makes_a_dataset_of_it(
     assert row.split()[:3] == ["episode-2", "6", "shape"]
     assert sums.startswith("1 of 15 frames, in 1 of 3 episodes; those episodes are in ")
     assert [path.name for path in (tmp_path / "far").iterdir()] == ["episode-2.mcap"]
+    with pytest.raises(NothingMatches, match="'frame > 99' holds for none of 15 frames"):
+        run("filter", data, "frame > 99", "--out", tmp_path / "none")
+    assert not (tmp_path / "none").exists()
     run("filter", data, "kind = 'shape'", "--episodes", "--json")
     assert [row["frames"] for row in json.loads(capsys.readouterr().out)] == [2, 1, 3]
 
@@ -58,3 +65,12 @@ def test_diff_exits_with_1_where_there_is_a_difference(
     assert json.loads(capsys.readouterr().out) == [
         {"file": "episode-2.mcap", "difference": f"only in {data}"}
     ]
+
+
+def test_diff_compares_like_with_like(data: Path) -> None:
+    file = data / "episode-0.mcap"
+    for pair in ((data, file), (file, data)):
+        with pytest.raises(UnlikePaths, match=r"data is a directory and .*mcap is a file"):
+            run("diff", *pair)
+    with pytest.raises(MissingPath, match="nowhere does not exist"):
+        run("diff", data, data / "nowhere")

@@ -1,11 +1,12 @@
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dnet.geometry.chamfer import chamfer
 from dnet.geometry.chamfer_to import ChamferTo
 
 
+@settings(deadline=None, max_examples=40)
 @given(counts=st.lists(st.integers(1, 60), min_size=1, max_size=4), seed=st.integers(0, 99))
 def test_it_is_the_chamfer_distance_to_one_cloud_after_the_other(
     counts: list[int], seed: int

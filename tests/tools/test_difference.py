@@ -7,10 +7,12 @@ import pytest
 from mcap.writer import CompressionType
 
 from dnet.datasets.index import open_index
-from dnet.tools.difference import compare_datasets, compare_episodes, first_difference
+from dnet.geometry.camera import Camera
+from dnet.recorders.episode import EpisodeWriter
+from dnet.tools.difference import PACKED, compare_datasets, compare_episodes, first_difference
 from tests.datasets.dataset import write_dataset
 from tests.datasets.test_reader import rewrite
-from tests.recorders.rollout import frames, write
+from tests.recorders.rollout import ARMS, frames, meta, step, with_image, write
 
 
 def test_an_episode_does_not_differ_from_its_copy_however_it_is_packed(tmp_path: Path) -> None:
@@ -74,3 +76,66 @@ def test_other_numbers_of_points_have_no_distance(tmp_path: Path, count: int) ->
     found = compare_episodes(one, other)
     assert found.frames["cloud_mm"].null_count() == found.frames.height == 2 * count - 1
     assert "cloud of 64 and 66 points" in found.frames["what"][0]
+
+
+def servo(path: Path, *, shift: float, chamfer: float) -> Path:
+    seen = frames(2)
+    with EpisodeWriter(path, meta("run"), arms=ARMS, attachments={}) as writer:
+        writer.set_goal(seen[-1].cloud + np.float32(shift))
+        writer.add_step(replace(step(seen[0], seen[-1]), chamfer=chamfer), 0)
+        writer.finish({"outcome": "converged"})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("shift", "chamfer", "topics"),
+    [(0.0, 0.01, set()), (0.01, 0.01, {"/cloud/goal"}), (0.0, 0.02, {"/step", "/log"})],
+)
+def test_goals_and_steps_are_compared(
+    tmp_path: Path, shift: float, chamfer: float, topics: set[str]
+) -> None:
+    one = servo(tmp_path / "a.mcap", shift=0.0, chamfer=0.01)
+    found = compare_episodes(one, servo(tmp_path / "b.mcap", shift=shift, chamfer=chamfer))
+    assert set(found.messages) == topics
+    assert found.same != bool(topics)
+    assert not found.facts
+    assert not found.frames.height
+    assert set(found.messages.values()) <= {0}
+
+
+def test_images_are_compared(tmp_path: Path) -> None:
+    camera, seen = Camera(width=8, height=6), frames(2)
+    looks = [[with_image(one, camera) for one in seen] for _ in range(2)]
+    looks[1][1] = with_image(seen[1], camera, seed=1)
+    one, other = (
+        write(tmp_path / f"{name}.mcap", look, name="a", camera=camera)
+        for name, look in zip("ab", looks, strict=True)
+    )
+    found = compare_episodes(one, other)
+    assert found.messages == {"/camera/depth": 1, "/camera/mask": 1}
+    assert first_difference(found) == "/camera/depth: from message 1 on"
+
+
+def test_a_message_that_only_one_has_is_a_difference(tmp_path: Path) -> None:
+    one = write(tmp_path / "a.mcap", frames(2), name="a")
+    other = rewrite(
+        one,
+        tmp_path / "b.mcap",
+        lambda topic, number, old: None if (topic, number) == ("/log", 1) else old,
+    )
+    for pair in ((one, other), (other, one)):
+        assert compare_episodes(*pair).messages == {"/log": 1}
+
+
+def test_packing_and_files_that_are_broken_alike_are_told_apart(tmp_path: Path) -> None:
+    one = write_dataset(tmp_path / "one", (2,))
+    other = tmp_path / "other"
+    shutil.copytree(one, other)
+    (other / "episode-0.mcap").unlink()
+    rewrite(one / "episode-0.mcap", other / "episode-0.mcap", compression=CompressionType.ZSTD)
+    for folder in (one, other):
+        (folder / "alike.mcap").write_bytes(b"noise")
+        (folder / "unlike.mcap").write_bytes(folder.name.encode())
+    rows = dict(compare_datasets(open_index(one), open_index(other)).iter_rows())
+    assert rows["episode-0.mcap"] == PACKED
+    assert rows.keys() == {"episode-0.mcap", "unlike.mcap"}

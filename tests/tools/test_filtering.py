@@ -37,3 +37,10 @@ def test_what_is_no_condition_is_refused_with_the_columns(tmp_path: Path, condit
     index = open_index(write_dataset(tmp_path, (2,)))
     with pytest.raises(BadCondition, match=r"is no condition on frames: .*motion_mm"):
         matching_frames(index, condition)
+
+
+def test_a_refusal_lists_the_columns_once(tmp_path: Path) -> None:
+    index = open_index(write_dataset(tmp_path, (2,)))
+    with pytest.raises(BadCondition) as refused:
+        matching_frames(index, "speed > 1")
+    assert str(refused.value).count("motion_mm") == 1

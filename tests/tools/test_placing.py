@@ -1,10 +1,19 @@
+import os
 import shutil
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from dnet.datasets.index import open_index
-from dnet.errors import BadEpisode, ClashingEpisodes, OccupiedOutput, TooFew
+from dnet.errors import (
+    BadEpisode,
+    ClashingEpisodes,
+    NoEpisodes,
+    OccupiedOutput,
+    TooFew,
+    Unwritten,
+)
 from dnet.tools.merging import merge_datasets
 from dnet.tools.placing import place_episodes
 from dnet.tools.splitting import split_dataset
@@ -74,3 +83,76 @@ def test_files_that_cannot_be_read_are_refused_or_left_out(tmp_path: Path) -> No
         merge_datasets([open_index(one)], tmp_path / "both")
     merged = merge_datasets([open_index(one)], tmp_path / "both", skip_broken=True)
     assert (merged.episodes, merged.broken) == (1, (str(one / "noise.mcap"),))
+
+
+def test_what_a_symbolic_link_leads_to_is_placed(tmp_path: Path) -> None:
+    source = write(tmp_path / "store" / "a.mcap", frames(2))
+    link = tmp_path / "links" / "a.mcap"
+    link.parent.mkdir()
+    link.symlink_to(os.path.relpath(source, link.parent))
+    place_episodes({"a.mcap": link}, tmp_path / "far" / "away")
+    placed = tmp_path / "far" / "away" / "a.mcap"
+    assert not placed.is_symlink()
+    assert placed.samefile(source)
+
+
+@pytest.mark.parametrize("copy", [False, True])
+@pytest.mark.parametrize("made", [False, True])
+def test_a_failure_halfway_leaves_nothing_behind(tmp_path: Path, copy: bool, made: bool) -> None:
+    source, out = write(tmp_path / "a.mcap", frames(2)), tmp_path / "out"
+    if made:
+        out.mkdir()
+        (out / "notes.txt").write_text("precious")
+    before = sorted(tmp_path.rglob("*"))
+    files = {"a.mcap": source, "b.mcap": tmp_path / "gone.mcap"}
+    with pytest.raises(Unwritten, match="No such file"):
+        place_episodes(files, out, copy=copy)
+
+    def interrupt(_done: int, _total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        place_episodes({"a.mcap": source}, out, copy=copy, on_file=interrupt)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_episodes_without_a_pair_change_no_side(tmp_path: Path, seed: int) -> None:
+    index = open_index(write_dataset(tmp_path / "data", (1, 2, 2, 1, 2)))
+    sides = split_dataset(index, tmp_path / "out", fraction=0.25, seed=seed)
+    division = divide(index, fraction=0.25, seed=seed)
+    judged = {f"{survey.episode_id}.mcap" for survey in division.validation}
+    assert set(contents(sides[1].folder)) == judged
+    assert set(contents(sides[0].folder)) == set(index.files["name"]) - judged
+
+
+def test_a_split_writes_nothing_where_one_of_its_folders_is_occupied(tmp_path: Path) -> None:
+    index = open_index(write_dataset(tmp_path / "data", (2, 2)))
+    write(tmp_path / "out" / "validation" / "old.mcap", frames(2))
+    with pytest.raises(OccupiedOutput, match="validation already holds"):
+        split_dataset(index, tmp_path / "out", fraction=0.25, seed=0)
+    assert not (tmp_path / "out" / "training").exists()
+
+
+def test_a_folder_given_twice_is_taken_once_and_said(tmp_path: Path) -> None:
+    index = open_index(write_dataset(tmp_path / "data", (2, 3)))
+    merged = merge_datasets([index, index], tmp_path / "both")
+    assert merged.episodes == 2
+    assert merged.repeated == tuple(str(index.path(name)) for name in index.files["name"])
+
+
+def test_files_of_one_name_are_refused_with_a_way_out(tmp_path: Path) -> None:
+    one = write_dataset(tmp_path / "one", (2,))
+    write(tmp_path / "other" / "episode-0.mcap", frames(2), name="another")
+    indexes = [open_index(folder) for folder in (one, tmp_path / "other")]
+    with pytest.raises(ClashingEpisodes, match=r"have one name: episode-0\.mcap; .* rename one"):
+        merge_datasets(indexes, tmp_path / "both")
+
+
+def test_a_merge_of_nothing_readable_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "noise.mcap").write_bytes(b"noise")
+    index = open_index(tmp_path)
+    assert index.files.filter(pl.col("note") == "").height == 0
+    with pytest.raises(NoEpisodes, match=r"holds no \.mcap episode that can be read"):
+        merge_datasets([index], tmp_path / "both", skip_broken=True)
+    assert not (tmp_path / "both").exists()
