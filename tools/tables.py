@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-DECIMALS = {name: 4 for name in ("x", "y", "z", "motion_x", "motion_y", "motion_z")}
+DECIMALS = dict.fromkeys(("x", "y", "z", "motion_x", "motion_y", "motion_z"), 4)
 """Digits after the point by column; two for the others."""
 WRAPPED = ("note",)
 """Columns of prose: these give way on a narrow terminal."""
