@@ -7,7 +7,9 @@ from typing import Annotated
 import tyro
 
 from dnet.commands.inspect_diff import Diff
+from dnet.commands.inspect_export import Export
 from dnet.commands.inspect_filter import Filter
+from dnet.commands.inspect_import import Import
 from dnet.commands.inspect_material import Material
 from dnet.commands.inspect_merge import Merge
 from dnet.commands.inspect_plot import Plot
@@ -107,6 +109,8 @@ class Inspect:
         | Annotated[Split, tyro.conf.subcommand("split")]
         | Annotated[Filter, tyro.conf.subcommand("filter")]
         | Annotated[Diff, tyro.conf.subcommand("diff")]
+        | Annotated[Export, tyro.conf.subcommand("export")]
+        | Annotated[Import, tyro.conf.subcommand("import")]
         | Annotated[Material, tyro.conf.subcommand("material")]
     ]
 
