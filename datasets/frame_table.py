@@ -8,9 +8,10 @@ import numpy as np
 import polars as pl
 from jaxtyping import Bool, Float64, Int32, Int64
 
+from dnet.datasets.coherence import points_of_all, refuse_doubles
 from dnet.datasets.index import Index
 from dnet.datasets.index_rows import AXES
-from dnet.errors import BadEpisode, NoEpisodes, TooFew
+from dnet.errors import NoEpisodes, TooFew
 from dnet.types import Place
 
 SETTLED = ("rest", "shape")
@@ -92,11 +93,13 @@ def settled_frames(index: Index) -> FrameTable:
     files = index.files.filter(pl.col("note") == "")
     if not files.height:
         raise NoEpisodes(index.root, "holds no .mcap episode that can be read")
-    _refuse_doubles(index, files)
+    judged = "a network would be judged by what it has learned; remove one of them"
+    refuse_doubles(index, files, way_out=judged)
     frames = index.frames.filter(pl.col("kind").is_in(SETTLED))
     if not frames.height:
         raise TooFew(f"number of settled frames in {index.root}", 0, 1)
-    points = _same_points(index, frames)
+    one_number = "use episodes that were recorded with one number of points"
+    points = points_of_all(index, frames, way_out=one_number)
     numbers = pl.DataFrame({"name": files["name"], "file": np.arange(files.height, dtype=np.int32)})
     frames = frames.join(numbers, on="name", maintain_order="left")
     return FrameTable(
@@ -113,27 +116,3 @@ def settled_frames(index: Index) -> FrameTable:
         frames["data"].fill_null(COMPRESSED).to_numpy(),
         frames.select("chunk", "length", "message").to_numpy(),
     )
-
-
-def _refuse_doubles(index: Index, files: pl.DataFrame) -> None:
-    doubles = files.filter(pl.col("episode").is_duplicated()).sort("episode", "name")
-    if doubles.height:
-        first, second = doubles["name"][:2]
-        raise BadEpisode(
-            index.path(second),
-            f"holds the same episode as {first}: {doubles['episode'][0]}",
-            "a network would be judged by what it has learned; remove one of them",
-        )
-
-
-def _same_points(index: Index, frames: pl.DataFrame) -> int:
-    points = int(frames["points"][0])
-    others = frames.filter(pl.col("points") != points)
-    if others.height:
-        name, number, got = others.select("name", "frame", "points").row(0)
-        raise BadEpisode(
-            index.path(name),
-            f"has a cloud of {got} points at frame {number}, the first episode's have {points}",
-            "use episodes that were recorded with one number of points",
-        )
-    return points

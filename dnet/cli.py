@@ -59,9 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Exits with 0; with 1 and one line on stderr where dnet refuses; with 2 for arguments that it
     cannot read; with 130 after Ctrl-C.
     """
-    command = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        command.run()
+        parse(sys.argv[1:] if arguments is None else arguments).run()
     except DnetError as error:
         sys.exit(f"dnet: {_printable(str(error))}")
     except KeyboardInterrupt:

@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float32, Float64
 
+from dnet.datasets import coherence
 from dnet.datasets.index import Index
 from dnet.datasets.reader import SCHEMA_VERSION, EpisodeReader
 from dnet.errors import BadEpisode, NoEpisodes
@@ -136,30 +137,16 @@ def points_of_all(index: Index) -> int:
         BadEpisode: If the clouds differ in it.
     """
     _with_frames(index)
-    points = int(index.frames["points"][0])
-    others = index.frames.filter(pl.col("points") != points)
-    if others.height:
-        name, frame, got = others.select("name", "frame", "points").row(0)
-        raise BadEpisode(
-            index.path(name),
-            f"has a cloud of {got} points at frame {frame}, the first episode's have {points}",
-            "one table holds clouds of one size: export to npz or hdf5",
-        )
-    return points
+    one_size = "one table holds clouds of one size: export to npz or hdf5"
+    return coherence.points_of_all(index, index.frames, way_out=one_size)
 
 
 def _with_frames(index: Index) -> pl.DataFrame:
     files = index.files.filter((pl.col("note") == "") & (pl.col("frames") > 0))
     if not files.height:
         raise NoEpisodes(index.root, "holds no .mcap episode with a frame that can be read")
-    doubles = files.filter(pl.col("episode").is_duplicated()).sort("episode", "name")
-    if doubles.height:
-        first, second = doubles["name"][:2]
-        raise BadEpisode(
-            index.path(second),
-            f"holds the same episode as {first}: {doubles['episode'][0]}",
-            "one of them would count twice; move it elsewhere",
-        )
+    once = "one of them would count twice; move it elsewhere"
+    coherence.refuse_doubles(index, files, way_out=once)
     return files
 
 
