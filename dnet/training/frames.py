@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Bool, Float32, Int64
 from torch import Tensor
 
+from dnet.datasets.frame_table import SETTLED
 from dnet.errors import BadEpisode, TooFew
 from dnet.nets.deformernet import DeformerNetConfig
 from dnet.nets.neighbourhoods import GROUPINGS, Neighbourhoods, regroup
@@ -18,9 +19,6 @@ from dnet.types import Frame, FrameKind, Place, Point
 
 MOST_SAMPLINGS = 8
 """Choices of centroids of a cloud; more of them cost time and teach little more."""
-
-SETTLED: tuple[FrameKind, ...] = ("rest", "shape")
-"""Kinds of frame that pairs are made of; what is seen on the way is still moving."""
 
 
 @runtime_checkable
