@@ -62,8 +62,8 @@ def open_index(
 ) -> Index:
     """Return the index of the logs in a folder or under a URL, brought up to date.
 
-    Only new and changed files are read. The index is written back where that is possible; a
-    folder that cannot be written to is indexed all the same.
+    Only new and changed files are read. The index is written back where that is possible and it
+    holds a frame; a folder that cannot be written to is indexed all the same.
 
     Args:
         root: With `.mcap` files; `.part` files, recordings that run or were killed, don't count.
@@ -86,7 +86,9 @@ def open_index(
         return stored
     read = list(_read(root, wanted, workers, on_file))
     index = _merged(root, stored, kept, read)
-    _store(index)
+    if index.frames.height or stored is not None:
+        # Without a frame there is nothing to find again: who is refused leaves no trace.
+        _store(index)
     return index
 
 

@@ -104,6 +104,12 @@ def test_a_file_that_cannot_be_read_has_a_row_and_a_note(folder: Path) -> None:
     assert index.frames.height == sum(FRAMES_EACH)
 
 
+def test_a_folder_of_which_nothing_can_be_read_stays_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "noise.mcap").write_bytes(b"noise")
+    assert open_index(tmp_path).broken().height == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["noise.mcap"]
+
+
 @pytest.mark.parametrize("name", [FRAMES, FILES])
 @pytest.mark.parametrize("spoil", ["lost", "cut", "noise", "version", "other"])
 def test_an_index_that_will_not_do_is_made_anew(folder: Path, name: str, spoil: str) -> None:

@@ -95,8 +95,13 @@ def test_what_is_interrupted_leaves_nothing(
         elif done == 2:
             raise error
 
-    with pytest.raises(error):
-        export(index, tmp_path / "new" / "out", on_episode=stop)
+    # A shell that starts tests in the background has them ignore Ctrl-C.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(error):
+            export(index, tmp_path / "new" / "out", on_episode=stop)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert there[:2] == [True, True]
     assert not list((tmp_path / "new").iterdir())
 
