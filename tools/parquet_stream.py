@@ -33,6 +33,8 @@ def write_tables(tables: Iterator[pl.DataFrame], path: Path) -> None:
     Raises:
         OSError: If they cannot be written.
     """
+    # Polars makes the file some time later: from here on, others see that the name is taken.
+    path.touch()
     first = next(tables)
     stopped = Event()
 
