@@ -5,6 +5,8 @@
 
 Processor seconds, of pages that are in memory, so that neither a disk nor other work on the
 machine counts. Every reader gives the same clouds as float32 arrays, and touches all their bytes.
+Peers come with `pip install -e ".[peers]"`; LeRobot, which asks for other versions of torch, in a
+Python of its own that DNET_PEERS names.
 """
 
 import tempfile
@@ -31,14 +33,12 @@ from dnet.recorders import messages
 from dnet.recorders.episode import EpisodeWriter
 from dnet.recorders.mcap_sink import McapSink
 from dnet.types import Frame
-from tests.benchmarks.peers import PEERS, Kept, Unavailable
+from tests.benchmarks.pace import REPEATS, at_random, sequential
+from tests.benchmarks.peers import PEERS, Kept, Unavailable, lerobot_speeds
 from tests.recorders import rollout
 
-REPEATS = 3
 RANDOM = 4000
 """Clouds that are read at random; fewer of a reader that is slow."""
-PATIENCE = 4.0
-"""Seconds after which a slow reader has shown its speed."""
 SAMPLES = 20_000
 MANY = 1_000_000
 """Frames of the large index."""
@@ -66,7 +66,7 @@ class Benchmark:
             root = self.data or self._made_up(scratch / "data", console)
             index = _opened(root, console)
             table = settled_frames(index)
-            self._compare(table, scratch, console)
+            self._compare(index, scratch, console)
             _stream(table, console)
             _query(index, scratch, console)
             _written(Clouds(table), scratch, console)
@@ -92,9 +92,10 @@ class Benchmark:
         )
         return folder
 
-    def _compare(self, table: FrameTable, scratch: Path, console: Console) -> None:
+    def _compare(self, index: Index, scratch: Path, console: Console) -> None:
+        table = settled_frames(index)
         clouds = Clouds(table)
-        rows = np.random.default_rng(1).integers(len(table), size=RANDOM)
+        rows = np.random.default_rng(1).integers(len(table), size=RANDOM).tolist()
         shown = Table(
             "reader",
             *("sequential MB/s", "of memmap", "random clouds/s", "of memmap", "of stock mcap"),
@@ -111,13 +112,21 @@ class Benchmark:
                     continue
                 stack.callback(kept.close)
                 _require_same(kept, clouds, peer.name)
-                found[peer.name] = (_sequential(kept), _random(kept, rows.tolist()))
+                found[peer.name] = (
+                    kept.sequential and sequential(kept.sequential),
+                    kept.random and at_random(kept.random, rows),
+                )
+        if self.peers:
+            try:
+                found["LeRobot"] = lerobot_speeds(index, rows, scratch)
+            except Unavailable as error:
+                missing.append(f"LeRobot: {error}")
         limit, stock = found["npy memmap"], found["mcap, stock reader"]
-        for name, (sequential, at_random) in found.items():
+        for name, (in_order, scattered) in found.items():
             shown.add_row(
                 name,
-                *(_number(sequential), _ratio(sequential, limit[0])),
-                *(_number(at_random), _ratio(at_random, limit[1]), _ratio(at_random, stock[1])),
+                *(_number(in_order), _ratio(in_order, limit[0])),
+                *(_number(scattered), _ratio(scattered, limit[1]), _ratio(scattered, stock[1])),
             )
         console.print(shown)
         for line in missing:
@@ -156,38 +165,6 @@ def _require_same(kept: Kept, clouds: Clouds, name: str) -> None:
     if kept.sequential is not None:
         first = next(iter(kept.sequential()))
         np.testing.assert_array_equal(first, clouds[0], err_msg=name)
-
-
-def _sequential(kept: Kept) -> float | None:
-    """Return MB a CPU-second, None if it has no such way to read."""
-    if kept.sequential is None:
-        return None
-    speeds = []
-    for _ in range(REPEATS):
-        size, begin = 0, process_time()
-        for cloud in kept.sequential():
-            cloud.max()
-            size += cloud.nbytes
-            if process_time() - begin > PATIENCE:
-                break
-        speeds.append(size / 1e6 / (process_time() - begin))
-    return max(speeds)
-
-
-def _random(kept: Kept, rows: Sequence[int]) -> float | None:
-    """Return clouds a CPU-second, None if it has no such way to read."""
-    if kept.random is None:
-        return None
-    speeds = []
-    for _ in range(REPEATS):
-        done, begin = 0, process_time()
-        for row in rows:
-            kept.random(row).max()
-            done += 1
-            if process_time() - begin > PATIENCE:
-                break
-        speeds.append(done / (process_time() - begin))
-    return max(speeds)
 
 
 def _stream(table: FrameTable, console: Console) -> None:

@@ -1,8 +1,11 @@
 """What else people keep clouds in: each writes those of a dataset its own way and reads them."""
 
 import io
+import json
+import os
+import subprocess
 import tarfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -13,9 +16,11 @@ import numpy as np
 from mcap.reader import McapReader, make_reader
 
 from dnet.datasets.clouds import Clouds
+from dnet.datasets.index import Index
 from dnet.datasets.point_cloud import read_point_cloud
 from dnet.datasets.reader import CLOUD, EpisodeReader
 from dnet.datasets.stores import join
+from dnet.tools.export_lerobot import export_lerobot
 from dnet.types import Cloud
 
 
@@ -114,6 +119,30 @@ def _webdataset(clouds: Clouds, folder: Path) -> Kept:
             yield sample["npy"]
 
     return Kept(sequential, None)
+
+
+def lerobot_speeds(index: Index, rows: Sequence[int], folder: Path) -> tuple[float, float]:
+    """Return MB and random clouds a CPU-second of LeRobot, from its own Python."""
+    python = os.environ.get("DNET_PEERS")
+    if not python:
+        raise Unavailable("DNET_PEERS names no Python with lerobot")
+    exported, chosen = folder / "lerobot", folder / "rows.json"
+    export_lerobot(index, exported)
+    chosen.write_text(json.dumps(rows), encoding="utf-8")
+    quiet = {"HF_HOME": str(folder / "hf"), "HF_HUB_OFFLINE": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [python, "-W", "ignore", "-m", "benchmarks.lerobot_reader", exported, chosen],
+        capture_output=True,
+        text=True,
+        check=False,
+        # From within tests/: packages of that name lie about in other Pythons.
+        cwd=Path(__file__).parents[1],
+        env=os.environ | quiet,
+    )
+    if done.returncode:
+        raise Unavailable(f"{python} failed: {done.stderr.splitlines()[-1]}")
+    sequential, at_random = json.loads(done.stdout.splitlines()[-1])
+    return sequential, at_random
 
 
 def _installed(name: str) -> Any:
