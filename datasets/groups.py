@@ -1,6 +1,7 @@
 """Groups for training on all pairs: some clouds of one episode, each to be encoded once."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -41,6 +42,18 @@ class GroupBatch:
         """Return the batch in memory from which a GPU reads fastest."""
         parts = (self.clouds, self.grasps, self.groups, self.current, self.goal, self.rows)
         return GroupBatch(*(part.pin_memory() for part in parts))
+
+
+class Chosen(NamedTuple):
+    """Which frames a batch of groups has."""
+
+    rows: Rows
+    groups: Rows
+    """Which group of the batch each is in, from 0."""
+    current: Rows
+    """Of each pair: which of the frames is the current one."""
+    goal: Rows
+    """Of each pair: which of the frames is the goal."""
 
 
 @dataclass(frozen=True)
@@ -103,14 +116,19 @@ class Groups(Dataset[GroupBatch]):
     def __len__(self) -> int:
         return len(self.dealt)
 
-    def __getitem__(self, drawn: Drawn) -> GroupBatch:
-        """Return a batch of groups."""
+    def choose(self, drawn: Drawn) -> Chosen:
+        """Return which frames a batch of groups has, and its pairs."""
         groups = [self.dealt.rows(number, epoch=drawn.epoch) for number in drawn.numbers.tolist()]
         sizes = np.array([len(group) for group in groups])
         rows, numbers = np.concatenate(groups), np.repeat(np.arange(len(groups)), sizes)
         # All pairs of the batch, those within one group.
         same = numbers[:, None] == numbers
         current, goal = np.nonzero(same & ~np.eye(len(rows), dtype=bool))
+        return Chosen(rows, numbers, current, goal)
+
+    def __getitem__(self, drawn: Drawn) -> GroupBatch:
+        """Return a batch of groups."""
+        rows, numbers, current, goal = self.choose(drawn)
         grasps = self.clouds.table.grasps[rows].astype(np.float32)
         arrays = (self.clouds.stack(rows), grasps, numbers, current, goal, rows)
         return GroupBatch(*(torch.from_numpy(array) for array in arrays))

@@ -1,72 +1,80 @@
 """Arrays that are computed from an episode once, and kept beside the data by its content."""
 
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
 from dnet.datasets.stores import is_url
+from dnet.errors import Unwritten
 from dnet.types import Place
 
 FOLDER = ".cache"
 """In a dataset's folder; it can be thrown away."""
 
-Tables = Mapping[str, NDArray[Any]]
+Records = NDArray[Any]
+"""A structured array, a record a frame."""
 
 
 @dataclass(frozen=True)
 class TableCache:
-    """Tables of some kind, in a file an episode, found by what the episode holds.
-
-    A file that cannot be read is computed anew; a folder that cannot be written to costs the time
-    of computing, and nothing else.
-    """
+    """Records of some kind, in a file an episode, found by what the episode holds."""
 
     folder: Path
     kind: str
-    """What the tables are; a word that can be a folder's name."""
+    """What the records are; a word that can be a folder's name."""
     version: str
-    """Everything that they depend on besides the episode: another version, other tables."""
+    """Everything that they depend on besides the episode: another version, other records."""
 
-    def get(self, digest: str, compute: Callable[[], Tables]) -> Tables:
-        """Return the tables of an episode.
+    def find(self, digest: str, dtype: np.dtype[Any]) -> Records | None:
+        """Return the records of an episode, mapped; None if they are not there, or not whole.
 
         Args:
             digest: SHA-256 of the episode's file.
-            compute: Returns them where they are not there yet.
+            dtype: Of the records.
+        """
+        try:
+            records = np.load(self._path(digest), mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError):
+            return None
+        return records if records.dtype == dtype and records.ndim == 1 else None
+
+    def put(self, digest: str, records: Records) -> None:
+        """Keep the records of an episode.
+
+        Raises:
+            Unwritten: If they cannot be written.
         """
         path = self._path(digest)
-        try:
-            return load(path.read_bytes())
-        except (OSError, SafetensorError):
-            tables = compute()
-        self._put(path, tables)
-        return tables
-
-    def _path(self, digest: str) -> Path:
-        version = sha256(self.version.encode()).hexdigest()[:16]
-        return self.folder / f"{self.kind}-{version}" / f"{digest}.safetensors"
-
-    def _put(self, path: Path, tables: Tables) -> None:
         # Two processes may do this at a time: each writes a file of its own.
         part = path.with_name(f"{path.name}.{os.getpid()}.part")
-        with suppress(OSError):
+        try:
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
-                part.write_bytes(save(dict(tables)))
+                with part.open("wb") as file:
+                    np.save(file, records, allow_pickle=False)
                 part.replace(path)
             finally:
                 part.unlink(missing_ok=True)
+        except OSError as error:
+            raise Unwritten(path.parent, str(error)) from error
+
+    def _path(self, digest: str) -> Path:
+        version = sha256(self.version.encode()).hexdigest()[:16]
+        return self.folder / f"{self.kind}-{version}" / f"{digest}.npy"
 
 
 def cache_folder(root: Place) -> Path:
-    """Return where tables of a dataset are kept: in its folder, or with the user's for a URL."""
-    return user_cache_path("dnet") if is_url(root) else Path(root) / FOLDER
+    """Return where tables of a dataset are kept.
+
+    In its folder, or with the user's other caches for a URL and a folder that is not to be
+    written to.
+    """
+    if is_url(root) or not os.access(root, os.W_OK):
+        return user_cache_path("dnet")
+    return Path(root) / FOLDER

@@ -545,3 +545,38 @@ class UnusedOption(DnetError, ValueError):
 
     def __init__(self, option: str, needs: str) -> None:
         super().__init__(f"{option} does nothing without {needs}; leave one out or add the other")
+
+
+class BadTables(DnetError, RuntimeError):
+    """Neighbour tables that went missing or are damaged while a training reads them."""
+
+    def __init__(self, folder: Path, why: str) -> None:
+        super().__init__(
+            f"the neighbour tables in {folder}: {why}; remove that folder, it can be found anew, "
+            "and run the same command again"
+        )
+
+
+class Uneven(DnetError, ValueError):
+    """A batch that the processes of a training cannot share evenly."""
+
+    def __init__(self, batch: int, processes: int) -> None:
+        super().__init__(
+            f"a batch of {batch} cannot be shared evenly by {processes} processes; "
+            f"choose --groups that {processes} divides"
+        )
+
+
+class OtherRun(DnetError, ValueError):
+    """A training that is to go on with other settings, or other data, than it began with."""
+
+    def __init__(self, run: Path, name: str, before: object, now: object) -> None:
+        super().__init__(
+            f"the training in {run} has {name} {_short(before)}, not {_short(now)}; "
+            "go on with the settings and the data that it began with, or choose another --out"
+        )
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -10,12 +10,16 @@ if TYPE_CHECKING:
     import torch
     from rich.console import Console
 
-    from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
-    from dnet.training.episodes import Division
+    from dnet.nets.deformernet import DeformerNetConfig
+    from dnet.training.division import Division
     from dnet.training.frames import Frames
-    from dnet.training.loop import Result, TrainingSettings
+    from dnet.training.parallel import Process
     from dnet.training.run import RunWriter
-    from dnet.types import Place
+    from dnet.training.settings import TrainingSettings
+    from dnet.training.training import Training
+
+WATCHED = 2000
+"""Frames of each held-out set that are judged after every epoch; all of them are at the end."""
 
 
 @dataclass(frozen=True)
@@ -23,36 +27,60 @@ class Train:
     """Train DeformerNet on episodes and keep the network that judges unseen ones best.
 
     Every settled frame of an episode is paired with every other: the network sees both clouds
-    and learns the motion of the grasp between them. Some episodes are held out to judge it by.
-    The run directory gets config.json, best.safetensors, last.safetensors and metrics.jsonl, a
-    line an epoch. Ctrl-C stops after the last whole epoch and keeps what was learned.
+    and learns the motion of the grasp between them. Some episodes are held out, and some shapes
+    of the others, to judge it by. Clouds are read from the logs as they are needed.
+
+    The run directory gets best.safetensors and last.safetensors, each of which is enough for
+    `dnet servo`, a model card, metrics.jsonl (a line an epoch), training.rrd (for `dnet play`),
+    config.json, and state.safetensors, from which --resume goes on. Ctrl-C stops after the batch
+    under way and keeps everything; a kill loses five minutes at most.
 
     Example: dnet train --from-mcap data/small --out runs/small --epochs 200
+
+    On several processes or machines: torchrun --nproc-per-node 2 --no-python dnet train ...
     """
 
     from_mcap: Path
     """Directory with episodes of `dnet record`; two or more."""
     out: Path
-    """Directory for the run; made if need be, must hold none yet."""
-    epochs: int = 200
+    """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
+    resume: bool = False
+    """Go on with the training in --out, exactly where it was put down; begin it if there is
+    none. Everything else must be as it was."""
+    epochs: int = 100
     """How often every frame is seen (paper: 100, of 30,000 frames)."""
     minutes: float | None = None
     """Stop in this time even so. The schedule then follows the clock, and a second training on
     the same data ends in slightly different weights."""
+    pairs: Literal["all", "any", "rest"] = "all"
+    """`all` pairs of the clouds of a group, each encoded once; `any` two frames, drawn one pair
+    at a time; from `rest` to another shape, as in the paper."""
     size: Literal["light", "paper"] = "light"
     """Levels of the encoder; `paper` takes seven times as long."""
     norm: Literal["group", "batch"] = "group"
     """Normalisation; `batch` is what the paper states."""
     schedule: Literal["cosine", "step"] = "cosine"
     """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
+    learning_rate: float = 2e-3
+    """Of Adam, at its highest (paper: 0.001)."""
+    groups: int = 4
+    """Groups in a batch, over all processes, each of another episode as a rule."""
+    frames: int = 8
+    """Clouds in a group; 4 groups of 8 are 32 encodings and 224 pairs."""
     augment: bool = True
     """Turn and shift each group of frames about the table at random."""
-    validation: float = 0.25
-    """Share of the episodes to hold out; at least one is."""
+    validation: float = 0.15
+    """Share of the episodes to hold out, at least one, and of the shapes of the others."""
     seed: int = 0
     """Of the division, the first weights, the order and the augmentation."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where to train; `auto` takes a GPU if there is one."""
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """Of activations; `auto` takes bfloat16 on a GPU that computes with it."""
+    workers: int = 0
+    """Processes that read ahead; none is fastest on a CPU. The order is the same with any."""
+    tensorboard: bool = False
+    """Also write RUN/tensorboard (pip install deformernet[tensorboard])."""
 
     def run(self) -> None:
         """Train, with a progress bar, and print the errors.
@@ -62,65 +90,83 @@ class Train:
         """
         from rich.console import Console
 
-        from dnet.commands.index_bar import read_index
-        from dnet.commands.training_screen import error_table, show_data
-        from dnet.nets.deformernet import DeformerNetConfig
         from dnet.training.allocation import keep_pages
-        from dnet.training.episodes import divide
-        from dnet.training.loop import new_network
-        from dnet.training.run import RunWriter
-        from dnet.training.scores import errors_of
+        from dnet.training.parallel import meeting, this_process
 
         self._check()
-        settings, device, console = self._settings(), self._device(), Console(stderr=True)
+        process = this_process()
+        device = self._device(process)
+        console = Console(stderr=True, quiet=not process.first)
+        keep_pages()
+        with meeting(process, device):
+            self._train(process, device, console)
+
+    def _train(self, process: "Process", device: "torch.device", console: "Console") -> None:
+        from rich.console import Console
+
+        from dnet.commands.index_bar import read_index
+        from dnet.commands.training_end import finish
+        from dnet.commands.training_screen import show_data
+        from dnet.nets.deformernet import DeformerNetConfig
+        from dnet.training.division import divide
+        from dnet.training.run import RunWriter
+
+        if not process.first:
+            process.wait()  # for the index and the tables that the first one makes
         index = read_index(self.from_mcap, console)
         division = divide(index, fraction=self.validation, seed=self.seed)
-        config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.points)
-        writer = RunWriter(self.out, self._describe(division, config, settings))
-        keep_pages()
-        training, validation = _read(
-            division, config, root=index.root, seed=self.seed, console=console
-        )
-        model = new_network(config, seed=self.seed).to(device)
-        show_data(console, division, training)
-        result = self._fit(
-            model,
-            training,
-            validation=validation,
-            settings=settings,
-            writer=writer,
-            console=console,
-        )
-        writer.finish(result, config)
-        model.load_state_dict(result.best)
-        errors = {
-            "training": errors_of(model, training),
-            "validation": errors_of(model, validation),
-        }
-        Console().print(error_table(errors))
-        console.print(_closing_line(result, self.out))
+        config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.training.points)
+        settings = self._settings(device)
+        content = self._describe(division, config, settings)
+        run = RunWriter(self.out, content, resume=self.resume)
+        frames = _prepared(division, config, console)
+        if process.first:
+            process.wait()
+        show_data(console, division, frames)
+        training = self._begin(frames, config, settings, device=device, process=process)
+        resumed = run.take_up(training)
+        if resumed:
+            console.print(f"going on after {training.steps} batches, {training.seconds:.0f} s")
+        self._fit(training, division, frames=frames, run=run, console=console)
+        if process.first:
+            finish(training, division, run=run, frames=frames, console=console, out=Console())
 
     def _check(self) -> None:
-        from dnet.errors import TooFew, TooShort
+        from dnet.errors import BadNumber, TooFew, TooShort
 
-        for what, value, least in (("--epochs", self.epochs, 1), ("--seed", self.seed, 0)):
+        for what, value, least in (
+            ("--epochs", self.epochs, 1),
+            ("--seed", self.seed, 0),
+            ("--workers", self.workers, 0),
+        ):
             if value < least:
                 raise TooFew(what, value, least)
         if self.minutes is not None and not self.minutes > 0:
             raise TooShort("--minutes", self.minutes)
+        if not 0 < self.learning_rate < math.inf:
+            raise BadNumber("--learning-rate", self.learning_rate, "a positive number")
 
-    def _settings(self) -> "TrainingSettings":
+    def _settings(self, device: "torch.device") -> "TrainingSettings":
+        import torch
+
         from dnet.training.augment import Augmentation
-        from dnet.training.loop import TrainingSettings
+        from dnet.training.settings import TrainingSettings
 
+        gains = device.type == "cuda" and torch.cuda.is_bf16_supported()
+        auto: Literal["float32", "bfloat16"] = "bfloat16" if gains else "float32"
         return TrainingSettings(
             epochs=self.epochs,
+            learning_rate=self.learning_rate,
             schedule=self.schedule,
             seed=self.seed,
+            pairs=self.pairs,
+            groups=self.groups,
+            frames=self.frames,
             augmentation=Augmentation() if self.augment else None,
+            precision=auto if self.precision == "auto" else self.precision,
         )
 
-    def _device(self) -> "torch.device":
+    def _device(self, process: "Process") -> "torch.device":
         import torch
 
         from dnet.errors import NoDevice
@@ -128,98 +174,92 @@ class Train:
         present = torch.cuda.is_available()
         if self.device == "cuda" and not present:
             raise NoDevice("cuda")
-        return torch.device("cuda" if present and self.device != "cpu" else "cpu")
+        if present and self.device != "cpu":
+            return torch.device("cuda", process.local_rank)
+        return torch.device("cpu")
 
     def _describe(
         self, division: "Division", config: "DeformerNetConfig", settings: "TrainingSettings"
     ) -> dict[str, Any]:
         """Return what shaped the run, as config.json holds it."""
-        from dnet.training.frames import samplings_for
-
-        samplings = samplings_for(sum(survey.frames for survey in division.training))
+        parts = {
+            "training": division.training,
+            "unseen_shapes": division.unseen_shapes,
+            "unseen_episodes": division.unseen_episodes,
+        }
         return {
             "network": asdict(config),
-            "training": asdict(settings) | {"minutes": self.minutes, "samplings": samplings},
+            "training": asdict(settings) | {"minutes": self.minutes},
             "data": {
                 "directory": str(self.from_mcap),
-                "training": [survey.episode_id for survey in division.training],
-                "validation": [survey.episode_id for survey in division.validation],
+                "validation": self.validation,
+                "training": sorted({division.training.episodes[i] for i in division.training.file}),
+                "unseen_episodes": sorted(
+                    {division.unseen_episodes.episodes[i] for i in division.unseen_episodes.file}
+                ),
+                "frames": {name: len(table) for name, table in parts.items()},
+                "fingerprints": {name: table.fingerprint for name, table in parts.items()},
             },
             "versions": {name: version(name) for name in ("deformernet", "torch")},
         }
 
+    def _begin(
+        self,
+        frames: "Frames",
+        config: "DeformerNetConfig",
+        settings: "TrainingSettings",
+        *,
+        device: "torch.device",
+        process: "Process",
+    ) -> "Training":
+        from dnet.training.examples import stream_of
+        from dnet.training.loop import new_network
+        from dnet.training.training import Training
+
+        stream = stream_of(
+            frames,
+            settings,
+            process=process,
+            workers=self.workers,
+            pin=device.type == "cuda",
+        )
+        model = new_network(config, seed=self.seed).to(device)
+        seconds = math.inf if self.minutes is None else 60 * self.minutes
+        return Training(model, stream, settings, process=process, seconds=seconds)
+
     def _fit(
         self,
-        model: "DeformerNet",
-        training: "Frames",
+        training: "Training",
+        division: "Division",
         *,
-        validation: "Frames",
-        settings: "TrainingSettings",
-        writer: "RunWriter",
+        frames: "Frames",
+        run: "RunWriter",
         console: "Console",
-    ) -> "Result":
+    ) -> None:
+        from dnet.commands.stopping import stopping
         from dnet.commands.training_screen import TrainingBar
-        from dnet.training.loop import EpochDone, StepDone, fit
+        from dnet.training.division import thinned
+        from dnet.training.frames import Frames
+        from dnet.training.loop import HeldOut, fit
 
-        with TrainingBar(console, epochs=self.epochs) as bar:
-
-            def on_event(event: StepDone | EpochDone) -> None:
-                bar.show(event)
-                if isinstance(event, EpochDone):
-                    writer.add(event, model)
-
-            return fit(
-                model,
-                training,
-                validation=validation,
-                settings=settings,
-                on_event=on_event,
-                seconds=math.inf if self.minutes is None else 60 * self.minutes,
-            )
-
-
-def _read(
-    division: "Division",
-    config: "DeformerNetConfig",
-    *,
-    root: "Place",
-    seed: int,
-    console: "Console",
-) -> "tuple[Frames, Frames]":
-    """Return the training and the validation frames, with a progress bar."""
-    from dnet.commands.progress import progress
-    from dnet.training.episodes import open_each
-    from dnet.training.frames import read_frames, samplings_for
-    from dnet.training.neighbour_tables import KeptNeighbourhoods
-
-    surveys = (*division.training, *division.validation)
-    find = KeptNeighbourhoods(root, {survey.path: survey.digest for survey in surveys})
-    learned, judged = (
-        sum(survey.frames for survey in part) for part in (division.training, division.validation)
-    )
-    with progress(console, "clouds") as bar:
-        task = bar.add_task("finding neighbours", total=learned + judged)
-
-        def advance() -> None:
-            bar.advance(task)
-
-        training = read_frames(
-            open_each(division.training),
-            config,
-            samplings=samplings_for(learned),
-            seed=seed,
-            find=find,
-            on_cloud=advance,
+        samplings, config = frames.tables.samplings, frames.config
+        watched = (
+            Frames.of(thinned(table, WATCHED), config, samplings=samplings)
+            for table in (division.unseen_shapes, division.unseen_episodes)
         )
-        judged_by = open_each(division.validation)
-        return training, read_frames(judged_by, config, find=find, on_cloud=advance)
+        with TrainingBar(console, epochs=self.epochs) as bar, stopping(training.stop):
+            fit(training, HeldOut(*watched), run=run, on_event=bar.show)
 
 
-def _closing_line(result: "Result", out: Path) -> str:
-    best = min(result.history, key=lambda done: done.validation.any_pair.mse_mm2)
-    seconds = result.history[-1].seconds
-    ended = "interrupted; " if result.interrupted else ""
-    return (
-        f"{ended}{len(result.history)} epochs in {seconds:.0f} s, the best was epoch "
-        f"{best.epoch}; wrote {out}"
-    )
+def _prepared(division: "Division", config: "DeformerNetConfig", console: "Console") -> "Frames":
+    """Return the frames to learn from; find the tables of all frames, with a progress bar."""
+    from dnet.commands.progress import progress
+    from dnet.training.frames import Frames
+    from dnet.training.neighbour_tables import NeighbourTables, samplings_for
+
+    samplings = samplings_for(len(division.training))
+    with progress(console, "clouds") as bar:
+        task = bar.add_task("finding neighbours", total=len(division.all))
+        tables = NeighbourTables(division.all, config, samplings)
+        tables.build(on_clouds=lambda done: bar.advance(task, done))
+    return Frames.of(division.training, config, samplings=samplings)

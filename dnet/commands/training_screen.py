@@ -14,20 +14,25 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from dnet.training.episodes import Division
+from dnet.training.division import Division, pairs_of
 from dnet.training.frames import Frames
-from dnet.training.loop import EpochDone, StepDone
-from dnet.training.scores import Errors, Scores, score
+from dnet.training.progress import EpochDone, StepDone
+from dnet.training.scores import Errors, Scores, no_motion
 
 
 def show_data(console: Console, division: Division, training: Frames) -> None:
-    """Print what there is to learn from, and how wrong it is to predict no motion."""
-    zero = score_of_no_motion(training)
+    """Print what there is to learn from, and how wrong it is to predict no motion, or the mean."""
+    zero = no_motion(training)
+    table = division.training
+    seen, unseen = (
+        len({part.episodes[file] for file in part.file.tolist()})
+        for part in (table, division.unseen_episodes)
+    )
     console.print(
-        f"{len(division.training)} episodes to train on, {len(division.validation)} to validate "
-        f"on; {len(training.grasps)} frames, {training.pairs} ordered pairs, "
-        f"mean |motion| {zero.zero_mean_mm:.1f} mm "
-        f"(predicting no motion: {zero.zero_mse_mm2:.0f} mm²)"
+        f"{seen} episodes to train on, {unseen} to validate on; {len(table)} frames, "
+        f"{pairs_of(table)} ordered pairs, mean |motion| {zero.zero_mean_mm:.1f} mm "
+        f"(predicting no motion: {zero.zero_mse_mm2:.0f} mm², their mean: "
+        f"{zero.mean_mse_mm2:.0f} mm²)"
     )
     if division.skipped:
         console.print(f"{division.skipped} files without two settled frames left out")
@@ -43,7 +48,7 @@ class TrainingBar:
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("loss {task.fields[loss]}"),
-            TextColumn("validation {task.fields[validation]}"),
+            TextColumn("unseen episodes {task.fields[validation]}"),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
             console=console,
@@ -67,36 +72,34 @@ class TrainingBar:
         bar, task = self._progress, self._task
         bar.update(task, completed=event.progress, epoch=f"{event.epoch}/{self._epochs}")
         if isinstance(event, EpochDone):
-            validation = f"{event.validation.any_pair.mse_mm2:.1f} mm²"
+            validation = f"{event.unseen_episodes.any_pair.mse_mm2:.1f} mm²"
             bar.update(task, loss=f"{event.loss_mm2:.1f}", validation=validation)
 
 
-def error_table(errors: Mapping[str, Errors]) -> Table:
+def error_table(errors: Mapping[str, Errors | None]) -> Table:
     """Return the errors on each set of frames as a table."""
     table = Table(title="errors of the best network")
-    for name in ("frames of", "pairs", "count", "MSE", "error", "R²", "no motion"):
+    names = ("frames of", "pairs", "count", "MSE", "sum", "error", "R²", "no motion")
+    for name in names:
         table.add_column(name, justify="left" if name in ("frames of", "pairs") else "right")
     for name, of in errors.items():
+        if of is None:
+            continue
         table.add_row(name, "any two", *_cells(of.any_pair))
         if of.from_rest is not None:
             table.add_row(name, "rest to shape", *_cells(of.from_rest))
     table.caption = (
-        "MSE: mean over x, y, z, mm²; error: mean Euclidean distance, mm; "
-        "no motion: MSE of predicting none"
+        "MSE: squared error, mean over x, y, z, mm²; sum: summed over them; error: mean "
+        "Euclidean distance, mm; no motion: MSE of predicting none"
     )
     return table
-
-
-def score_of_no_motion(frames: Frames) -> Scores:
-    """Return the scores of predicting zero for every pair of `frames`."""
-    motions = frames.motions(*frames.all_pairs())
-    return score(motions * 0, motions)
 
 
 def _cells(scores: Scores) -> tuple[str, ...]:
     return (
         str(scores.pairs),
         f"{scores.mse_mm2:.2f}",
+        f"{scores.sum_mm2:.2f}",
         f"{scores.mean_mm:.2f}",
         "-" if scores.r2 is None else f"{scores.r2:.3f}",
         f"{scores.zero_mse_mm2:.1f}",

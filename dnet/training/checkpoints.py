@@ -45,14 +45,29 @@ def save(
         metrics: What is known of it, as JSON, for people.
     """
     header = {"network": _NETWORK, "config": asdict(config), "metrics": dict(metrics or {})}
+    write_tensors(path, weights, header)
+
+
+def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> None:
+    """Write tensors and a JSON header into the file `path`, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in weights.items()}
+    # Clones: a network that is trained on goes on changing, and some tensors share memory.
+    kept = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        beside.write_bytes(save_tensors(tensors, metadata={_KEY: json.dumps(header)}))
+        beside.write_bytes(save_tensors(kept, metadata={_KEY: json.dumps(header)}))
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return the header and the tensors of a file of `write_tensors`.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt.
+    """
+    return _read(path)
 
 
 def load(path: Path) -> DeformerNet:

@@ -1,70 +1,121 @@
-"""The directory of one training: its config, its best and last weights, a line for every epoch."""
+"""The directory of one training: its config, its networks, a line an epoch, where to go on."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dnet.errors import BadCheckpoint, OccupiedOutput
-from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
-from dnet.training.checkpoints import BEST, save, write_json
-from dnet.training.loop import EpochDone, Result
+from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun
+from dnet.nets.deformernet import DeformerNet
+from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
+from dnet.training.progress import EpochDone
+from dnet.training.training import Training
 
-LAST, CONFIG, METRICS = "last.safetensors", "config.json", "metrics.jsonl"
+LAST, CONFIG, METRICS, STATE = (
+    "last.safetensors",
+    "config.json",
+    "metrics.jsonl",
+    "state.safetensors",
+)
 
 
 class RunWriter:
     """Writes a training down as it goes.
 
-    The directory is made with the first epoch: a training that never got there leaves none.
+    The directory is made with the first thing that is worth keeping.
 
     Args:
         path: The run directory.
         content: What shaped the training, as JSON.
+        resume: Whether to go on with the training that `path` holds, if it does.
 
     Raises:
-        OccupiedOutput: If `path` holds a run, or is a file.
+        OccupiedOutput: If `path` holds a run and is not to be gone on with, or is a file.
+        OtherRun: If it holds a training with other settings or other data.
+        BadCheckpoint: If what it holds cannot be read.
     """
 
-    def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, content: Mapping[str, Any], *, resume: bool = False) -> None:
         self.path = path
-        self._content = content
-        self._began = False
+        self.history: list[dict[str, Any]] = []
+        """What was written of each epoch."""
+        self.content = json.loads(json.dumps(content))
+        self._state: tuple[dict[str, Any], Any] | None = None
         if path.exists() and not path.is_dir():
             raise OccupiedOutput(path, "a file")
-        held = [name for name in (BEST, LAST, CONFIG, METRICS) if (path / name).exists()]
-        if held:
-            raise OccupiedOutput(path, f"a run ({', '.join(held)})")
+        held = [name for name in (BEST, LAST, CONFIG, METRICS, STATE) if (path / name).exists()]
+        if held and not resume:
+            raise OccupiedOutput(path, f"a run ({', '.join(held)}); --resume goes on with it")
+        if STATE in held:
+            self._resume()
 
-    def add(self, done: EpochDone, model: DeformerNet) -> None:
-        """Write down an epoch and the weights that it left."""
-        if not self._began:
-            write_json(self.path / CONFIG, self._content)
-            self._began = True
+    @property
+    def least(self) -> float:
+        """The smallest error over any pair of unseen episodes so far, in mm²."""
+        errors = (line["unseen_episodes"]["any_pair"]["mse_mm2"] for line in self.history)
+        return min(errors, default=math.inf)
+
+    def take_up(self, training: Training) -> bool:
+        """Put `training` where the run was put down; return whether there was anything.
+
+        Raises:
+            OtherStream: If that was with other data.
+            BadCheckpoint: If it does not fit the network.
+        """
+        if self._state is None:
+            return False
+        facts, tensors = self._state
+        try:
+            training.load(tensors, facts["training"])
+        except (KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise BadCheckpoint(
+                self.path / STATE, f"does not fit this training ({error})", "train anew"
+            ) from error
+        return True
+
+    def add(self, done: EpochDone, network: DeformerNet) -> None:
+        """Write down an epoch and the network that it left."""
         metrics = asdict(done)
-        # Written as it goes, so that a crash loses the epoch under way alone.
-        with (self.path / METRICS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(metrics) + "\n")
-        weights = model.state_dict()
+        self.history.append(json.loads(json.dumps(metrics)))
+        self._write_history()
+        weights = network.state_dict()
         if done.best:
-            save(self.path / BEST, weights, config=model.config, metrics=metrics)
-        save(self.path / LAST, weights, config=model.config, metrics=metrics)
+            save(self.path / BEST, weights, config=network.config, metrics=metrics)
+        save(self.path / LAST, weights, config=network.config, metrics=metrics)
 
-    def finish(self, result: Result, config: DeformerNetConfig) -> None:
-        """Write everything once more, in case an interrupt came in the middle of `add`."""
-        best = min(result.history, key=lambda done: done.validation.any_pair.mse_mm2)
-        write_json(self.path / CONFIG, self._content)
-        lines = [json.dumps(asdict(done)) + "\n" for done in result.history]
-        (self.path / METRICS).write_text("".join(lines), encoding="utf-8")
-        save(self.path / BEST, result.best, config=config, metrics=asdict(best))
-        save(self.path / LAST, result.last, config=config, metrics=asdict(result.history[-1]))
+    def save(self, training: Training) -> None:
+        """Put the training down, so that it can be taken up from here."""
+        write_json(self.path / CONFIG, self.content)
+        facts = {"epochs": len(self.history), "training": training.facts()}
+        write_tensors(self.path / STATE, training.tensors(), facts)
+
+    def _resume(self) -> None:
+        before = read_config(self.path)
+        for part in ("network", "training", "data"):
+            for name, value in self.content[part].items():
+                if before.get(part, {}).get(name) != value:
+                    raise OtherRun(self.path, name, before.get(part, {}).get(name), value)
+        facts, tensors = read_tensors(self.path / STATE)
+        lines = (self.path / METRICS).read_text(encoding="utf-8") if facts["epochs"] else ""
+        # Epochs since then come again, and come out the same.
+        self.history = [json.loads(line) for line in lines.splitlines()[: facts["epochs"]]]
+        self._state = facts, tensors
+        self._write_history()
+
+    def _write_history(self) -> None:
+        """Write the config and all epochs, each file whole or not at all."""
+        write_json(self.path / CONFIG, self.content)
+        part = self.path / f".{METRICS}.part"
+        part.write_text("".join(json.dumps(line) + "\n" for line in self.history), "utf-8")
+        part.replace(self.path / METRICS)
 
 
 def read_config(run: Path) -> dict[str, Any]:
     """Return what shaped the training of a run directory.
 
-    `["data"]["validation"]` names the episodes that the network was not trained on.
+    `["data"]["unseen_episodes"]` names the episodes that the network was not trained on.
 
     Raises:
         BadCheckpoint: If the directory holds no config, or a corrupt one.

@@ -1,17 +1,23 @@
 """How far predicted motions are from true ones, next to predicting no motion at all."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import torch
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float
 from torch import Tensor
 
+from dnet.datasets.pairs import AnyTwo
 from dnet.nets.deformernet import DeformerNet
-from dnet.nets.neighbourhoods import stack
-from dnet.training.frames import Frames
+from dnet.training.frames import Frames, Rows
 
 # Encoded and compared at once: few enough that judging takes no more memory than learning.
 _CLOUDS, _PAIRS = 32, 65536
+
+Watch = Callable[[Rows, Rows, Float[Tensor, "p 3"], Float[Tensor, "p 3"]], None]
+"""Told of pairs as they are judged: rows of the current and the goal frames, the predicted and
+the true motions in metres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +27,8 @@ class Scores:
     pairs: int
     mse_mm2: float
     """Squared error, mean over pairs and over x, y, z, in square millimetres."""
+    sum_mm2: float
+    """Squared error, mean over pairs and summed over x, y, z: three times `mse_mm2`."""
     mean_mm: float
     """Mean Euclidean error in millimetres."""
     r2: float | None
@@ -29,6 +37,8 @@ class Scores:
     """`mse_mm2` of predicting no motion."""
     zero_mean_mm: float
     """`mean_mm` of predicting no motion: the mean length of a motion."""
+    mean_mse_mm2: float
+    """`mse_mm2` of predicting the mean motion of these pairs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,52 +51,120 @@ class Errors:
     """From the rest shape to every other: its first step; None without a rest frame."""
 
 
+class Tally:
+    """Adds up what scores are made of, pair by pair, in double precision."""
+
+    def __init__(self) -> None:
+        self.pairs = 0
+        self._squares = self._lengths = self._true_squares = self._true_lengths = 0.0
+        self._true = torch.zeros(3, dtype=torch.float64)
+
+    def add(self, predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> None:
+        """Count some pairs, both motions in metres."""
+        predicted_mm, true_mm = predicted.double() * 1000, true.double() * 1000
+        error = predicted_mm - true_mm
+        self.pairs += len(true)
+        self._squares += error.square().sum().item()
+        self._lengths += error.norm(dim=1).sum().item()
+        self._true += true_mm.sum(dim=0)
+        self._true_squares += true_mm.square().sum().item()
+        self._true_lengths += true_mm.norm(dim=1).sum().item()
+
+    def scores(self) -> Scores:
+        """Return the errors over all that were counted; there must be some."""
+        pairs = self.pairs
+        variance = self._true_squares - self._true.square().sum().item() / pairs
+        return Scores(
+            pairs=pairs,
+            mse_mm2=self._squares / pairs / 3,
+            sum_mm2=self._squares / pairs,
+            mean_mm=self._lengths / pairs,
+            r2=1 - self._squares / variance if variance > 1e-12 * self._true_squares else None,
+            zero_mse_mm2=self._true_squares / pairs / 3,
+            zero_mean_mm=self._true_lengths / pairs,
+            mean_mse_mm2=variance / pairs / 3,
+        )
+
+
 def score(predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> Scores:
     """Return the errors of `predicted` motions, both in metres."""
-    predicted_mm, true_mm = predicted.double() * 1000, true.double() * 1000
-    error = predicted_mm - true_mm
-    variance = (true_mm - true_mm.mean(dim=0)).square().sum().item()
-    return Scores(
-        pairs=len(true),
-        mse_mm2=float(error.square().mean()),
-        mean_mm=float(error.norm(dim=1).mean()),
-        r2=1 - error.square().sum().item() / variance if variance else None,
-        zero_mse_mm2=float(true_mm.square().mean()),
-        zero_mean_mm=float(true_mm.norm(dim=1).mean()),
-    )
+    tally = Tally()
+    tally.add(predicted, true)
+    return tally.scores()
 
 
-def errors_of(model: DeformerNet, frames: Frames) -> Errors:
-    """Return the errors of `model` on `frames`, each cloud with its usual centroids."""
+def errors_of(
+    model: DeformerNet,
+    frames: Frames,
+    *,
+    watch: Watch | None = None,
+    on_clouds: Callable[[int], None] = lambda _: None,
+) -> Errors | None:
+    """Return the errors of `model` on all pairs of `frames`, None if there is no pair.
+
+    One episode after another, each cloud with its usual centroids, so that the memory it takes
+    does not grow with the dataset.
+
+    Args:
+        model: On any device.
+        frames: To judge it by.
+        watch: Told of all pairs.
+        on_clouds: Called with how many clouds are done, as they are.
+    """
     was_training = model.training
     model.eval()
+    every, rest = Tally(), Tally()
     try:
-        with torch.no_grad():
-            current, goal = frames.all_pairs()
-            predicted = _predict(model, frames, current, goal)
+        with torch.inference_mode():
+            for file in np.unique(frames.table.file).tolist():
+                rows = np.flatnonzero(frames.table.file == file)
+                features = _encode(model, frames, rows)
+                _judge(model, frames, rows, features=features, tallies=(every, rest), watch=watch)
+                on_clouds(len(rows))
     finally:
         model.train(was_training)
-    true = frames.motions(current, goal)
-    from_rest = frames.rest[current]
-    return Errors(
-        score(predicted, true),
-        score(predicted[from_rest], true[from_rest]) if from_rest.any() else None,
-    )
+    if not every.pairs:
+        return None
+    return Errors(every.scores(), rest.scores() if rest.pairs else None)
 
 
-def _predict(
-    model: DeformerNet, frames: Frames, current: Int64[Tensor, " p"], goal: Int64[Tensor, " p"]
-) -> Float32[Tensor, "p 3"]:
+def no_motion(frames: Frames) -> Scores:
+    """Return the scores of predicting no motion for every pair of `frames`."""
+    tally = Tally()
+    for file in np.unique(frames.table.file).tolist():
+        rows = np.flatnonzero(frames.table.file == file)
+        pairs = AnyTwo((len(rows),))
+        current, goal = pairs.rows(np.arange(len(pairs)))
+        true = torch.from_numpy(frames.motions(rows[current], rows[goal]))
+        tally.add(true * 0, true)
+    return tally.scores()
+
+
+def _encode(model: DeformerNet, frames: Frames, rows: Rows) -> Float[Tensor, "n 256"]:
     device = next(model.parameters()).device
-    clouds = [choices[0] for choices in frames.clouds]
-    batches = (clouds[first : first + _CLOUDS] for first in range(0, len(clouds), _CLOUDS))
-    features = torch.cat([model.encode(stack(batch).to(device)) for batch in batches])
-    motions = [
-        model.motion(features[one], features[other]).cpu()
-        for one, other in zip(
-            torch.split(current.to(device), _PAIRS),
-            torch.split(goal.to(device), _PAIRS),
-            strict=True,
-        )
-    ]
-    return torch.cat(motions)
+    batches = np.split(rows, range(_CLOUDS, len(rows), _CLOUDS))
+    return torch.cat([model.encode(frames.prepared(batch).to(device)) for batch in batches])
+
+
+def _judge(
+    model: DeformerNet,
+    frames: Frames,
+    rows: Rows,
+    *,
+    features: Float[Tensor, "n 256"],
+    tallies: tuple[Tally, Tally],
+    watch: Watch | None,
+) -> None:
+    """Count all pairs of the frames of one episode."""
+    every, rest = tallies
+    pairs = AnyTwo((len(rows),))
+    for start in range(0, len(pairs), _PAIRS):
+        numbers = np.arange(start, min(start + _PAIRS, len(pairs)))
+        current, goal = pairs.rows(numbers)
+        predicted = model.motion(features[current], features[goal]).float().cpu()
+        true = torch.from_numpy(frames.motions(rows[current], rows[goal]))
+        every.add(predicted, true)
+        begun = frames.table.rest[rows[current]]
+        rest.add(predicted[begun], true[begun])
+        if watch is not None:
+            watch(rows[current], rows[goal], predicted, true)

@@ -1,0 +1,73 @@
+"""What `dnet train` leaves at its end: the errors of the best network, told and written down."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dnet.training.division import Division
+    from dnet.training.frames import Frames
+    from dnet.training.run import RunWriter
+    from dnet.training.training import Training
+
+JUDGED = 5000
+"""Frames of the training set that the best network is judged by at the end."""
+
+
+def finish(
+    training: "Training",
+    division: "Division",
+    *,
+    run: "RunWriter",
+    frames: "Frames",
+    console: "Console",
+    out: "Console",
+) -> None:
+    """Judge the best network on everything that was held out, print and write the errors.
+
+    Args:
+        training: As it ended.
+        division: The data.
+        run: Of the training.
+        frames: What was learned from.
+        console: For what is told along the way.
+        out: For the result.
+    """
+    from dnet.commands.progress import progress
+    from dnet.commands.training_screen import error_table
+    from dnet.training.checkpoints import load
+    from dnet.training.division import thinned
+    from dnet.training.frames import Frames
+    from dnet.training.model_card import write_card
+    from dnet.training.scores import Errors, errors_of
+
+    if not run.history:
+        console.print(f"stopped before the first epoch was over; --resume goes on with {run.path}")
+        return
+    network = load(run.path).to(next(training.model.parameters()).device)
+    parts = {
+        "training": thinned(division.training, JUDGED),
+        "unseen shapes": division.unseen_shapes,
+        "unseen episodes": division.unseen_episodes,
+    }
+    errors: dict[str, Errors | None] = {}
+    with progress(console, "clouds") as bar:
+        task = bar.add_task("judging", total=sum(len(table) for table in parts.values()))
+        for name, table in parts.items():
+            judged = Frames.of(table, frames.config, samplings=frames.tables.samplings)
+            errors[name] = errors_of(
+                network, judged, on_clouds=lambda done: bar.advance(task, done)
+            )
+    write_card(run, errors)
+    out.print(error_table(errors))
+    console.print(_closing_line(training, run))
+
+
+def _closing_line(training: "Training", run: "RunWriter") -> str:
+    best = min(run.history, key=lambda line: line["unseen_episodes"]["any_pair"]["mse_mm2"])
+    ended = "interrupted, --resume goes on; " if training.stopped else ""
+    waited = 100 * training.waited / max(training.seconds, 1e-9)
+    return (
+        f"{ended}{len(run.history)} epochs in {training.seconds:.0f} s, {waited:.1f} % of it "
+        f"waiting for clouds; the best was epoch {best['epoch']}; wrote {run.path}"
+    )
