@@ -70,7 +70,15 @@ def pairs_of(table: FrameTable) -> int:
 
 
 def thinned(table: FrameTable, most: int) -> FrameTable:
-    """Return a table of about `most` of the frames, evenly from each episode, rest shapes kept."""
-    step = -(-len(table) // most)
-    place = np.arange(len(table)) - np.searchsorted(table.file, table.file)
-    return table.where(table.rest | (place % step == 0))
+    """Return a table of at most about `most` of the frames.
+
+    They are taken evenly from each episode, the first one, the rest shape, among them; two or
+    more of each, so that there are pairs: of very many episodes, some are left out instead.
+    """
+    files, counts = np.unique(table.file, return_counts=True)
+    step = -(-2 * len(files) // most)
+    each = max(2, most // len(files[::step]))
+    chosen = np.zeros(len(table), dtype=bool)
+    for start, count in list(zip(np.cumsum(counts) - counts, counts, strict=True))[::step]:
+        chosen[start + np.linspace(0, count - 1, min(each, count)).astype(int)] = True
+    return table.where(chosen)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import torch
 
+from dnet.errors import TooFew
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.training.frames import Frames
 from dnet.training.progress import EpochDone, StepDone
@@ -82,7 +83,8 @@ def _judged(training: Training, held_out: HeldOut, run: RunWriter) -> EpochDone:
     loss, losses = training.close_epoch()
     network = training.average
     unseen = errors_of(network, held_out.unseen_episodes)
-    assert unseen is not None, "episodes with pairs alone are held out"
+    if unseen is None:
+        raise TooFew("number of pairs of unseen episodes", 0, 1)
     return EpochDone(
         epoch=len(run.history) + 1,
         steps=training.steps,

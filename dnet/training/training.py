@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
@@ -108,9 +108,7 @@ class Training:
     @property
     def average(self) -> DeformerNet:
         """The network with averaged weights: the one to judge and to keep."""
-        network = self._average.module
-        assert isinstance(network, DeformerNet)
-        return network
+        return cast(DeformerNet, self._average.module)
 
     def stop(self) -> None:
         """Ask for an end after the next batch."""
