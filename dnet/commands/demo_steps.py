@@ -59,7 +59,7 @@ class Steps:
 
 def held_out_goal(data: Path, train: Path) -> tuple[Path, int]:
     """Return an episode that was not trained on, and its shape farthest from rest."""
-    name = read_config(train)["data"]["validation"][0]
+    name = read_config(train)["data"]["unseen_episodes"][0]
     path = data / f"{name}.mcap"
     with EpisodeReader(path) as episode:
         motions = np.linalg.norm(episode.grasps - episode.grasps[0], axis=1)
@@ -70,7 +70,7 @@ def summary(out: Path, seconds: dict[str, float]) -> Table:
     """Return the closing table of the demo in `out`."""
     shapes = int(list_episodes(out / "data")["shapes"].sum())
     epochs = [json.loads(line) for line in (out / "train" / METRICS).read_text().splitlines()]
-    scores = [epoch["validation"]["any_pair"] for epoch in epochs]
+    scores = [epoch["unseen_episodes"]["any_pair"] for epoch in epochs]
     best = min(scores, key=lambda score: float(score["mse_mm2"]))
     with EpisodeReader(out / "servo" / "run.mcap") as episode:
         result, goal = episode.result or {}, episode.meta.settings["goal"]

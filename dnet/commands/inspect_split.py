@@ -22,7 +22,7 @@ class Split:
     """A directory of episodes; it stays as it is."""
     out: Path
     """Gets the folders training and validation."""
-    validation: float = 0.25
+    validation: float = 0.15
     """Share of the episodes to judge by; both sides get at least one."""
     seed: int = 0
     """Of the division."""
