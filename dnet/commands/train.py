@@ -132,19 +132,18 @@ class Train:
             finish(training, division, run=run, frames=frames, console=console, out=Console())
 
     def _check(self) -> None:
-        from dnet.errors import BadNumber, TooFew, TooShort
+        from dnet.errors import TooFew, TooShort
 
         for what, value, least in (
             ("--epochs", self.epochs, 1),
             ("--seed", self.seed, 0),
             ("--workers", self.workers, 0),
+            ("--learning-rate", self.learning_rate, 1e-9),
         ):
             if value < least:
                 raise TooFew(what, value, least)
         if self.minutes is not None and not self.minutes > 0:
             raise TooShort("--minutes", self.minutes)
-        if not 0 < self.learning_rate < math.inf:
-            raise BadNumber("--learning-rate", self.learning_rate, "a positive number")
 
     def _settings(self, device: "torch.device") -> "TrainingSettings":
         import torch

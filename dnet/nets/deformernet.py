@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 from torch import Tensor, nn
 
 from dnet.errors import BadCloud, LongCloud, ShortCloud, TooFew
@@ -181,6 +181,8 @@ def prepare(cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud") -> 
     return find_neighbourhoods(in_unit(cloud, config), GROUPINGS[config.size])
 
 
-def in_unit(cloud: Cloud, config: DeformerNetConfig) -> Cloud:
-    """Return a cloud in metres in the unit of a network of `config`."""
-    return (cloud / config.coordinate_unit).astype(np.float32)
+def in_unit(
+    clouds: Float32[np.ndarray, "*batch n 3"], config: DeformerNetConfig
+) -> Float32[np.ndarray, "*batch n 3"]:
+    """Return clouds in metres in the unit of a network of `config`."""
+    return (clouds / config.coordinate_unit).astype(np.float32)

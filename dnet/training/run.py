@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun
+from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream
 from dnet.nets.deformernet import DeformerNet
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
 from dnet.training.progress import EpochDone
@@ -69,6 +69,8 @@ class RunWriter:
         facts, tensors = self._state
         try:
             training.load(tensors, facts["training"])
+        except OtherStream:
+            raise
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise BadCheckpoint(
                 self.path / STATE, f"does not fit this training ({error})", "train anew"
@@ -102,7 +104,6 @@ class RunWriter:
         # Epochs since then come again, and come out the same.
         self.history = [json.loads(line) for line in lines.splitlines()[: facts["epochs"]]]
         self._state = facts, tensors
-        self._write_history()
 
     def _write_history(self) -> None:
         """Write the config and all epochs, each file whole or not at all."""

@@ -1,4 +1,5 @@
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ from dnet.errors import (
     NoEpisodes,
     NotAFraction,
     OccupiedOutput,
+    OtherRun,
     TooFew,
     TooShort,
 )
@@ -47,27 +49,30 @@ def run(episodes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_run_leaves_its_config_its_metrics_and_two_networks(run: Path) -> None:
     assert sorted(path.name for path in run.iterdir()) == [
+        "MODEL_CARD.md",
         "best.safetensors",
         "config.json",
         "last.safetensors",
         "metrics.jsonl",
+        "state.safetensors",
     ]
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     assert [line["epoch"] for line in lines] == [1, 2, 3]
-    assert all(line["validation"]["any_pair"]["pairs"] == 20 for line in lines)
+    assert all(line["unseen_episodes"]["any_pair"]["pairs"] == 20 for line in lines)
 
 
 def test_the_config_names_the_episodes_on_each_side(run: Path) -> None:
     data = read_config(run)["data"]
-    assert len(data["validation"]) == 1
-    assert sorted(data["training"] + data["validation"]) == [f"episode-{i}" for i in range(3)]
+    assert len(data["unseen_episodes"]) == 1
+    every = sorted(data["training"] + data["unseen_episodes"])
+    assert every == [f"episode-{i}" for i in range(3)]
 
 
 def test_the_best_network_has_the_error_that_the_metrics_say(run: Path, episodes: Path) -> None:
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    least = min(line["validation"]["any_pair"]["mse_mm2"] for line in lines)
+    least = min(line["unseen_episodes"]["any_pair"]["mse_mm2"] for line in lines)
     model = load(run)
-    (held_out,) = read_config(run)["data"]["validation"]
+    (held_out,) = read_config(run)["data"]["unseen_episodes"]
     with EpisodeReader(episodes / f"{held_out}.mcap") as episode:
         shapes = [index for index, kind in enumerate(episode.kinds) if kind != "way"]
         squares = [
@@ -96,17 +101,74 @@ def test_the_closing_table_and_the_data_are_told(
 ) -> None:
     Train(from_mcap=episodes, out=tmp_path / "run", epochs=1, size="light", norm="batch").run()
     told = capsys.readouterr()
-    assert "2 episodes to train on, 1 to validate on; 10 frames, 40 ordered pairs" in " ".join(
-        told.err.split()
-    )
+    assert "2 episodes to train on, 1 to validate on;" in " ".join(told.err.split())
     assert "no motion" in told.out
-    assert "validation" in told.out
+    assert "unseen" in told.out
     assert load(tmp_path / "run").config.norm == "batch"
 
 
 def test_time_limits_a_training_whatever_its_epochs(episodes: Path, tmp_path: Path) -> None:
     Train(from_mcap=episodes, out=tmp_path / "run", epochs=10**6, minutes=0.01).run()
     assert load(tmp_path / "run").config.points == POINTS
+
+
+def begun(episodes: Path, out: Path) -> subprocess.Popen[str]:
+    """Start a training and wait until it has learned for some epochs."""
+    code = "import sys; from dnet.cli import main; sys.exit(main())"
+    words = ["train", "--from-mcap", str(episodes), "--out", str(out), "--epochs", "60"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *words, "--device", "cpu"], stderr=subprocess.PIPE, text=True
+    )
+    while not (out / "metrics.jsonl").exists():
+        assert process.poll() is None, process.stderr and process.stderr.read()
+        time.sleep(0.05)
+    return process
+
+
+def untimed(run: Path) -> list[dict[str, object]]:
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    return [{k: v for k, v in one.items() if k not in ("seconds", "waited")} for one in lines]
+
+
+def test_ctrl_c_keeps_everything_and_resume_goes_on_exactly(episodes: Path, tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    Train(from_mcap=episodes, out=whole, epochs=60, device="cpu").run()
+    process = begun(episodes, parts)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate()
+    assert process.returncode == 0, told
+    assert "interrupted, --resume goes on" in " ".join(told.split())
+    assert len(untimed(parts)) < 60
+    Train(from_mcap=episodes, out=parts, epochs=60, device="cpu", resume=True).run()
+    assert untimed(parts) == untimed(whole)
+    assert load(parts).state_dict().keys() == load(whole).state_dict().keys()
+    for name, weights in load(parts).state_dict().items():
+        assert torch.equal(weights, load(whole).state_dict()[name])
+
+
+def test_a_killed_training_leaves_a_network_and_begins_again(
+    episodes: Path, tmp_path: Path
+) -> None:
+    process = begun(episodes, tmp_path / "run")
+    process.kill()
+    process.communicate()
+    assert load(tmp_path / "run").config.points == POINTS
+    Train(from_mcap=episodes, out=tmp_path / "run", epochs=60, resume=True).run()
+    assert [line["epoch"] for line in untimed(tmp_path / "run")] == list(range(1, 61))
+
+
+def test_a_finished_training_has_nothing_to_go_on_with(
+    run: Path, episodes: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (run / "best.safetensors").read_bytes()
+    Train(from_mcap=episodes, out=run, epochs=3, device="cpu", resume=True).run()
+    assert "errors of the best network" in capsys.readouterr().out
+    assert (run / "best.safetensors").read_bytes() == before
+
+
+def test_other_settings_are_not_gone_on_with(run: Path, episodes: Path) -> None:
+    with pytest.raises(OtherRun, match="has epochs 3, not 4"):
+        Train(from_mcap=episodes, out=run, epochs=4, device="cpu", resume=True).run()
 
 
 def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError], str]]:
@@ -117,6 +179,9 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, from_mcap=tmp_path / "none"), MissingPath, "none does not exist"),
         (replace(good, from_mcap=empty), NoEpisodes, "empty holds no .mcap episode"),
         (replace(good, epochs=0), TooFew, "--epochs is 0, must be at least 1"),
+        (replace(good, workers=-1), TooFew, "--workers is -1, must be at least 0"),
+        (replace(good, learning_rate=0.0), TooFew, "--learning-rate is 0.0, must be at least 1e-09"),
+        (replace(good, groups=0), TooFew, "number of groups in a batch is 0"),
         (replace(good, seed=-1), TooFew, "--seed is -1, must be at least 0"),
         (replace(good, minutes=0.0), TooShort, "--minutes is 0.0, must be above 0"),
         (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),

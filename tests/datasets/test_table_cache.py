@@ -3,53 +3,53 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dnet.datasets.table_cache import TableCache, Tables, cache_folder
+from dnet.datasets.table_cache import TableCache, cache_folder
+from dnet.errors import Unwritten
+
+DTYPE = np.dtype([("frame", "<i4"), ("near", "<i2", (3,))], align=True)
 
 
-class Computed:
-    """Tables that count how often they were computed."""
-
-    def __init__(self) -> None:
-        self.times = 0
-
-    def __call__(self) -> Tables:
-        self.times += 1
-        return {"a": np.arange(6, dtype=np.int16).reshape(2, 3), "b": np.ones(2, np.float32)}
+def records() -> np.ndarray:
+    made = np.zeros(4, DTYPE)
+    made["frame"], made["near"] = np.arange(4), np.arange(12).reshape(4, 3)
+    return made
 
 
-def test_tables_are_computed_once_for_each_content_and_version(tmp_path: Path) -> None:
-    compute = Computed()
+def test_records_come_back_by_content_and_version(tmp_path: Path) -> None:
     cache = TableCache(tmp_path / "cache", "things", "1")
-    for _ in range(3):
-        found = cache.get("digest", compute)
-        assert found.keys() == {"a", "b"}
-        np.testing.assert_array_equal(found["a"], [[0, 1, 2], [3, 4, 5]])
-        assert found["a"].dtype == np.int16
-    assert compute.times == 1
-    cache.get("other", compute)
-    TableCache(tmp_path / "cache", "things", "2").get("digest", compute)
-    assert compute.times == 3
+    assert cache.find("digest", DTYPE) is None
+    cache.put("digest", records())
+    found = cache.find("digest", DTYPE)
+    assert isinstance(found, np.memmap)
+    np.testing.assert_array_equal(found, records())
+    assert cache.find("other", DTYPE) is None
+    assert TableCache(tmp_path / "cache", "things", "2").find("digest", DTYPE) is None
+    assert len([path for path in tmp_path.rglob("*") if path.is_file()]) == 1
 
 
-def test_a_spoilt_file_is_computed_anew(tmp_path: Path) -> None:
-    compute = Computed()
+@pytest.mark.parametrize("kept", [0, 5, 60, -3])
+def test_a_file_that_is_not_whole_is_as_good_as_none(tmp_path: Path, kept: int) -> None:
     cache = TableCache(tmp_path, "things", "1")
-    cache.get("digest", compute)
-    (path,) = tmp_path.rglob("*.safetensors")
-    path.write_bytes(path.read_bytes()[:-3])
-    cache.get("digest", compute)
-    cache.get("digest", compute)
-    assert compute.times == 2
-    assert [file.name for file in tmp_path.rglob("*") if file.is_file()] == [path.name]
+    cache.put("digest", records())
+    (path,) = tmp_path.rglob("*.npy")
+    path.write_bytes(path.read_bytes()[:kept])
+    assert cache.find("digest", DTYPE) is None
 
 
-def test_a_folder_that_cannot_be_made_costs_time_alone(tmp_path: Path) -> None:
+def test_records_of_another_kind_and_pickles_are_as_good_as_none(tmp_path: Path) -> None:
+    cache = TableCache(tmp_path, "things", "1")
+    cache.put("digest", records())
+    assert cache.find("digest", np.dtype([("frame", "<i4")])) is None
+    (path,) = tmp_path.rglob("*.npy")
+    with path.open("wb") as file:
+        np.save(file, np.array([{}], dtype=object), allow_pickle=True)
+    assert cache.find("digest", DTYPE) is None
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
-    compute = Computed()
-    cache = TableCache(tmp_path / "file", "things", "1")
-    assert len(cache.get("digest", compute)["b"]) == 2
-    assert len(cache.get("digest", compute)["b"]) == 2
-    assert compute.times == 2
+    with pytest.raises(Unwritten, match="nothing can be written into"):
+        TableCache(tmp_path / "file", "things", "1").put("digest", records())
 
 
 def test_tables_lie_beside_the_data_and_those_of_a_url_on_this_machine(
@@ -57,4 +57,7 @@ def test_tables_lie_beside_the_data_and_those_of_a_url_on_this_machine(
 ) -> None:
     assert cache_folder(tmp_path).is_relative_to(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert not str(cache_folder("s3://bucket/data")).startswith("s3:")
+    elsewhere = cache_folder("s3://bucket/data")
+    assert not str(elsewhere).startswith("s3:")
+    # A folder that is not to be written to; of one that is not there, the system says the same.
+    assert cache_folder(tmp_path / "none") == elsewhere

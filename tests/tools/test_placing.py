@@ -17,7 +17,7 @@ from dnet.errors import (
 from dnet.tools.merging import merge_datasets
 from dnet.tools.placing import place_episodes
 from dnet.tools.splitting import split_dataset
-from dnet.training.episodes import divide
+from dnet.training.division import divide
 from tests.datasets.dataset import write_dataset
 from tests.recorders.rollout import frames, write
 
@@ -45,11 +45,11 @@ def test_the_folders_of_a_split_are_the_sides_of_a_training(tmp_path: Path) -> N
     index = open_index(folder)
     sides = split_dataset(index, tmp_path / "out", fraction=0.4, seed=3)
     division = divide(index, fraction=0.4, seed=3)
-    for side, surveys in zip(sides, (division.training, division.validation), strict=True):
-        ids = {f"{survey.episode_id}.mcap" for survey in surveys}
+    for side, table in zip(sides, (division.training, division.unseen_episodes), strict=True):
+        ids = {f"{table.episodes[file]}.mcap" for file in table.file.tolist()}
         assert set(contents(side.folder)) == ids
         assert side.episodes == len(ids)
-        assert side.shapes == sum(survey.frames - 1 for survey in surveys)
+    assert sum(side.shapes for side in sides) == int((~division.all.rest).sum())
     only = open_index(write_dataset(tmp_path / "one", (2,)))
     with pytest.raises(TooFew, match="is 1, must be at least 2"):
         split_dataset(only, tmp_path / "two", fraction=0.4, seed=3)
@@ -121,7 +121,8 @@ def test_episodes_without_a_pair_change_no_side(tmp_path: Path, seed: int) -> No
     index = open_index(write_dataset(tmp_path / "data", (1, 2, 2, 1, 2)))
     sides = split_dataset(index, tmp_path / "out", fraction=0.25, seed=seed)
     division = divide(index, fraction=0.25, seed=seed)
-    judged = {f"{survey.episode_id}.mcap" for survey in division.validation}
+    unseen = division.unseen_episodes
+    judged = {f"{unseen.episodes[file]}.mcap" for file in unseen.file.tolist()}
     assert set(contents(sides[1].folder)) == judged
     assert set(contents(sides[0].folder)) == set(index.files["name"]) - judged
 

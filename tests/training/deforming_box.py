@@ -9,10 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from dnet.datasets.frame_table import settled_frames
+from dnet.datasets.index import open_index
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNetConfig
-from dnet.training.frames import Frames, read_frames
+from dnet.training.frames import Frames
 from dnet.types import Frame, FrameKind
+from tests.recorders import rollout
 
 SMALL = DeformerNetConfig(points=160)
 SIZE, CENTRE = np.array([0.1, 0.1, 0.04]), np.array([0.0, 0.0, 0.02])
@@ -23,7 +26,6 @@ class BoxEpisode:
     seed: int
     kinds: tuple[FrameKind, ...] = ("rest", "shape", "shape", "shape", "shape", "shape")
     points: int = SMALL.points
-    path: Path = Path("box.mcap")
 
     def frame(self, index: int) -> Frame:
         rng = np.random.default_rng(self.seed)
@@ -50,6 +52,29 @@ class BoxEpisode:
             nodes=rest.astype(np.float32),
         )
 
+    @property
+    def frames(self) -> list[Frame]:
+        return [self.frame(index) for index in range(len(self.kinds))]
 
-def box_frames(seeds: Sequence[int]) -> Frames:
-    return read_frames([BoxEpisode(seed) for seed in seeds], SMALL)
+
+def write_boxes(folder: Path, boxes: Sequence[BoxEpisode]) -> Path:
+    """Write episodes, each named by its place among them."""
+    folder.mkdir(exist_ok=True)
+    for number, box in enumerate(boxes):
+        rollout.write(folder / f"box-{number}.mcap", box.frames)
+    return folder
+
+
+def box_frames(
+    folder: Path,
+    seeds: Sequence[int],
+    *,
+    samplings: int = 1,
+    config: DeformerNetConfig = SMALL,
+) -> Frames:
+    """Write a dataset of boxes and return its frames as a network takes them."""
+    boxes = [BoxEpisode(seed, points=config.points) for seed in seeds]
+    table = settled_frames(open_index(write_boxes(folder, boxes)))
+    frames = Frames.of(table, config, samplings=samplings)
+    frames.tables.build()
+    return frames

@@ -1,57 +1,50 @@
-import math
-from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 
-from dnet.errors import TooFew
-from dnet.nets.deformernet import DeformerNet
+from dnet.training import loop
+from dnet.training.checkpoints import load
+from dnet.training.examples import stream_of
 from dnet.training.frames import Frames
-from dnet.training.loop import (
-    EpochDone,
-    Result,
-    StepDone,
-    TrainingSettings,
-    Weights,
-    fit,
-    learning_rate_at,
-    new_network,
-)
+from dnet.training.loop import HeldOut, fit, new_network
+from dnet.training.parallel import Process
+from dnet.training.progress import EpochDone, StepDone
+from dnet.training.run import RunWriter
+from dnet.training.scores import errors_of
+from dnet.training.settings import TrainingSettings
+from dnet.training.training import Training, Weights
 from tests.training.deforming_box import SMALL, box_frames
 
-SHORT = TrainingSettings(epochs=2)
+SETTINGS = TrainingSettings(epochs=3, groups=1, frames=3)
+CONTENT: dict[str, Any] = {"network": {}, "training": {}, "data": {}}
 
 
 @pytest.fixture(scope="module")
-def training() -> Frames:
-    return box_frames([0, 1, 2])
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
+    return box_frames(tmp_path_factory.mktemp("boxes"), [0, 1, 2])
 
 
 @pytest.fixture(scope="module")
-def validation() -> Frames:
-    return box_frames([10])
+def held_out(tmp_path_factory: pytest.TempPathFactory) -> HeldOut:
+    shapes, episodes = (box_frames(tmp_path_factory.mktemp("held"), [seed]) for seed in (7, 8))
+    return HeldOut(shapes, episodes)
 
 
-def train(training: Frames, validation: Frames, settings: TrainingSettings = SHORT) -> Result:
-    model = new_network(SMALL, seed=settings.seed)
-    return fit(model, training, validation=validation, settings=settings)
+def begin(frames: Frames, settings: TrainingSettings = SETTINGS) -> Training:
+    stream = stream_of(frames, settings, process=Process())
+    return Training(new_network(SMALL, seed=settings.seed), stream, settings)
 
 
 def same(one: Weights, other: Weights) -> bool:
     return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
 
 
-def test_the_same_seed_gives_the_same_weights_and_another_seed_others(
-    training: Frames, validation: Frames
-) -> None:
-    first = train(training, validation)
-    again = train(training, validation)
-    other = train(training, validation, replace(SHORT, seed=1))
-    assert same(first.last, again.last)
-    assert [done.loss_mm2 for done in first.history] == [done.loss_mm2 for done in again.history]
-    assert not same(first.last, other.last)
+def untimed(run: Path) -> list[dict[str, Any]]:
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    return [{k: v for k, v in one.items() if k not in ("seconds", "waited")} for one in lines]
 
 
 def test_first_weights_are_a_function_of_the_seed_and_leave_the_global_generator_alone() -> None:
@@ -63,149 +56,89 @@ def test_first_weights_are_a_function_of_the_seed_and_leave_the_global_generator
     assert not same(one, other)
 
 
-@pytest.mark.parametrize("augmented", [True, False])
 def test_training_learns_motions_of_an_object_that_it_has_not_seen(
-    validation: Frames, augmented: bool
+    frames: Frames, held_out: HeldOut, tmp_path: Path
 ) -> None:
-    settings = TrainingSettings(epochs=20)
-    settings = settings if augmented else replace(settings, augmentation=None)
-    history = train(box_frames([0, 1, 2, 3]), validation, settings).history
-    best = min(done.validation.any_pair.mse_mm2 for done in history)
-    assert history[-1].loss_mm2 < history[0].loss_mm2 / 2
-    assert best < history[-1].validation.any_pair.zero_mse_mm2 / 2
+    run = RunWriter(tmp_path, CONTENT)
+    fit(begin(frames, TrainingSettings(epochs=20, groups=1, frames=3)), held_out, run=run)
+    losses = [line["loss_mm2"] for line in run.history]
+    assert losses[-1] < losses[0] / 2
+    errors = run.history[-1]["unseen_episodes"]["any_pair"]
+    assert run.least < errors["zero_mse_mm2"] / 2
 
 
-def test_the_best_weights_are_those_of_the_least_validation_error(
-    training: Frames, validation: Frames
+def test_the_best_network_is_that_of_the_least_error_on_unseen_episodes(
+    frames: Frames, held_out: HeldOut, tmp_path: Path
 ) -> None:
-    model = new_network(SMALL, seed=0)
+    run = RunWriter(tmp_path, CONTENT)
     seen: list[tuple[float, Weights]] = []
+    # So fast that epochs get worse again.
+    training = begin(frames, TrainingSettings(epochs=6, groups=1, frames=3, learning_rate=0.1))
 
     def keep(event: StepDone | EpochDone) -> None:
         if isinstance(event, EpochDone):
-            weights = {name: tensor.clone() for name, tensor in model.state_dict().items()}
-            seen.append((event.validation.any_pair.mse_mm2, weights))
-            assert event.best == (event.validation.any_pair.mse_mm2 == min(e for e, _ in seen))
+            network = {name: one.clone() for name, one in training.average.state_dict().items()}
+            seen.append((event.unseen_episodes.any_pair.mse_mm2, network))
+            assert event.best == (seen[-1][0] == min(error for error, _ in seen))
 
-    # So fast that epochs get worse again.
-    settings = TrainingSettings(epochs=5, learning_rate=0.02)
-    result = fit(model, training, validation=validation, settings=settings, on_event=keep)
-    assert same(result.best, min(seen, key=lambda pair: pair[0])[1])
-    assert same(result.last, seen[-1][1])
-    assert not result.interrupted
-
-
-def test_an_interrupt_keeps_the_last_whole_epoch(training: Frames, validation: Frames) -> None:
-    model = new_network(SMALL, seed=0)
-    kept: list[Weights] = []
-
-    def interrupt(event: StepDone | EpochDone) -> None:
-        if isinstance(event, EpochDone):
-            kept.append({name: tensor.clone() for name, tensor in model.state_dict().items()})
-        elif event.epoch == 3:
-            raise KeyboardInterrupt
-
-    settings = TrainingSettings(epochs=9)
-    result = fit(model, training, validation=validation, settings=settings, on_event=interrupt)
-    assert result.interrupted
-    assert [done.epoch for done in result.history] == [1, 2]
-    assert same(result.last, kept[1])
-    assert not same(result.last, model.state_dict())
+    fit(training, held_out, run=run, on_event=keep)
+    assert same(load(tmp_path).state_dict(), min(seen, key=lambda pair: pair[0])[1])
+    assert same(load(tmp_path / "last.safetensors").state_dict(), seen[-1][1])
+    errors = errors_of(load(tmp_path), held_out.unseen_episodes)
+    assert errors is not None
+    assert errors.any_pair.mse_mm2 == pytest.approx(run.least)
 
 
-def test_an_interrupt_before_the_first_epoch_is_over_leaves_nothing(
-    training: Frames, validation: Frames
-) -> None:
-    def interrupt(event: StepDone | EpochDone) -> None:
-        raise KeyboardInterrupt
-
-    model = new_network(SMALL, seed=0)
-    with pytest.raises(KeyboardInterrupt):
-        fit(model, training, validation=validation, settings=SHORT, on_event=interrupt)
-
-
-def test_time_ends_a_training_that_its_epochs_would_not(
-    training: Frames, validation: Frames
-) -> None:
-    model = new_network(SMALL, seed=0)
-    settings = TrainingSettings(epochs=10**6)
-    result = fit(model, training, validation=validation, settings=settings, seconds=1.5)
-    assert 1 <= len(result.history) < 1000
-    assert result.history[-1].progress == 1
-    assert not result.interrupted
-
-
-def test_no_time_at_all_still_learns_from_one_batch(training: Frames, validation: Frames) -> None:
-    model = new_network(SMALL, seed=0)
-    before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
-    steps: list[StepDone | EpochDone] = []
-    fit(
-        model,
-        training,
-        validation=validation,
-        settings=replace(SHORT, schedule="step"),
-        on_event=steps.append,
-        seconds=1e-9,
-    )
-    assert [type(event) for event in steps] == [StepDone, EpochDone]
-    assert not same(before, model.state_dict())
-
-
-def test_events_tell_every_step_and_progress_only_grows(
-    training: Frames, validation: Frames
+def test_events_tell_every_step_and_every_epoch(
+    frames: Frames, held_out: HeldOut, tmp_path: Path
 ) -> None:
     events: list[StepDone | EpochDone] = []
-    model = new_network(SMALL, seed=0)
-    fit(model, training, validation=validation, settings=SHORT, on_event=events.append)
-    for epoch in (1, 2):
-        steps = [e for e in events if isinstance(e, StepDone) and e.epoch == epoch]
-        assert [step.step for step in steps] == list(range(1, steps[0].steps + 1))
-        assert all(math.isfinite(step.loss_mm2) for step in steps)
-    progress = [event.progress for event in events]
-    assert progress == sorted(progress)
-    assert progress[-1] == 1
+    fit(begin(frames), held_out, run=RunWriter(tmp_path, CONTENT), on_event=events.append)
+    steps = [(event.epoch, event.step) for event in events if isinstance(event, StepDone)]
+    assert steps == [(epoch, step) for epoch in (1, 2, 3) for step in range(1, 7)]
+    epochs = [event for event in events if isinstance(event, EpochDone)]
+    assert [event.steps for event in epochs] == [6, 12, 18]
+    assert [event.progress for event in epochs] == pytest.approx([1 / 3, 2 / 3, 1])
 
 
-def test_batch_normalisation_trains_too(training: Frames, validation: Frames) -> None:
-    model = new_network(replace(SMALL, norm="batch"), seed=0)
-    result = fit(model, training, validation=validation, settings=TrainingSettings(epochs=4))
-    assert result.history[-1].loss_mm2 < result.history[0].loss_mm2
-
-
-@given(epochs=st.integers(1, 400), epoch=st.integers(0, 400))
-def test_steps_divide_the_rate_by_ten_every_fifty_epochs(epochs: int, epoch: int) -> None:
-    settings = TrainingSettings(epochs=epochs, schedule="step")
-    epoch = min(epoch, epochs - 1)
-    rate = learning_rate_at(settings, epoch / epochs)
-    assert rate == pytest.approx(1e-3 / 10 ** (epoch // 50))
-
-
-@given(one=st.floats(0, 1), other=st.floats(0, 1))
-def test_the_cosine_only_falls_from_the_first_rate_to_zero(one: float, other: float) -> None:
-    settings = TrainingSettings(schedule="cosine", learning_rate=0.5)
-    early, late = sorted((one, other))
-    assert learning_rate_at(settings, early) >= learning_rate_at(settings, late)
-    assert learning_rate_at(settings, 0.0) == 0.5
-    assert learning_rate_at(settings, 1.0) == 0
-
-
-@pytest.mark.parametrize(
-    ("settings", "complaint"),
-    [
-        ({"epochs": 0}, "number of epochs is 0, must be at least 1"),
-        ({"groups": 0}, "number of groups in a batch is 0, must be at least 1"),
-        ({"frames": 1}, "number of frames in a group is 1, must be at least 2"),
-    ],
-)
-def test_counts_that_make_no_sense_are_refused(settings: dict[str, int], complaint: str) -> None:
-    with pytest.raises(TooFew, match=complaint):
-        replace(SHORT, **settings)  # type: ignore[arg-type]
-
-
-def test_a_trained_network_predicts_what_it_was_scored_on(
-    training: Frames, validation: Frames
+@pytest.mark.parametrize("stop_at", [(1, 2), (2, 6), (3, 1)])
+def test_a_training_that_was_stopped_goes_on_exactly(
+    frames: Frames, held_out: HeldOut, tmp_path: Path, stop_at: tuple[int, int]
 ) -> None:
-    result = train(training, validation)
-    model = DeformerNet(SMALL)
-    model.load_state_dict(result.best)
-    assert all(torch.isfinite(weights).all() for weights in model.state_dict().values())
+    fit(begin(frames), held_out, run=RunWriter(tmp_path / "whole", CONTENT))
+    training = begin(frames)
+
+    def stop(event: StepDone | EpochDone) -> None:
+        if isinstance(event, StepDone) and (event.epoch, event.step) == stop_at:
+            training.stop()
+
+    fit(training, held_out, run=RunWriter(tmp_path / "parts", CONTENT), on_event=stop)
+    assert 0 < training.progress < 1
+    run = RunWriter(tmp_path / "parts", CONTENT, resume=True)
+    again = begin(frames)
+    assert run.take_up(again)
+    fit(again, held_out, run=run)
+    assert untimed(tmp_path / "parts") == untimed(tmp_path / "whole")
+    for name in ("best", "last"):
+        one, other = (load(tmp_path / run / f"{name}.safetensors") for run in ("parts", "whole"))
+        assert same(one.state_dict(), other.state_dict())
+
+
+def test_a_training_is_put_down_every_so_often(
+    frames: Frames, held_out: HeldOut, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill, which nothing can react to, loses what was learned since."""
+    monkeypatch.setattr(loop, "SAVE_SECONDS", 0.0)
+
+    class Killed(BaseException):
+        pass
+
+    def kill(event: StepDone | EpochDone) -> None:
+        if isinstance(event, StepDone) and (event.epoch, event.step) == (2, 4):
+            raise Killed
+
+    with pytest.raises(Killed):
+        fit(begin(frames), held_out, run=RunWriter(tmp_path, CONTENT), on_event=kill)
+    again = begin(frames)
+    assert RunWriter(tmp_path, CONTENT, resume=True).take_up(again)
+    assert again.steps == 9

@@ -3,17 +3,18 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from torch import Tensor
 
 from dnet.nets.deformernet import DeformerNet
-from dnet.training.frames import Frames
+from dnet.training.frames import Frames, Rows
 from dnet.training.loop import new_network
-from dnet.training.scores import errors_of, score
+from dnet.training.scores import errors_of, no_motion, score
 from tests.training.deforming_box import SMALL, BoxEpisode, box_frames
 
 
 @pytest.fixture(scope="module")
-def frames() -> Frames:
-    return box_frames([0, 1])
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
+    return box_frames(tmp_path_factory.mktemp("boxes"), [0, 1])
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +28,8 @@ def test_scores_of_a_worked_example() -> None:
     scores = score(predicted, true)
     assert scores.pairs == 2
     assert scores.mse_mm2 == pytest.approx((16 + 9 + 144) / 6)
+    assert scores.sum_mm2 == pytest.approx((16 + 9 + 144) / 2)
+    assert scores.mean_mse_mm2 == pytest.approx(12.5 / 6)
     assert scores.mean_mm == pytest.approx((5 + 12) / 2)
     assert scores.zero_mse_mm2 == pytest.approx((9 + 16) / 6)
     assert scores.zero_mean_mm == pytest.approx((3 + 4) / 2)
@@ -65,6 +68,7 @@ def test_errors_are_those_of_predicting_every_pair(model: DeformerNet, frames: F
                     squares.append(error)
                     if current.kind == "rest":
                         from_rest.append(error)
+    assert errors is not None
     assert errors.any_pair.pairs == len(squares) == 60
     assert errors.any_pair.mse_mm2 == pytest.approx(np.mean(squares), rel=1e-4)
     assert errors.from_rest is not None
@@ -85,5 +89,35 @@ def test_scoring_leaves_the_network_as_it_was(frames: Frames, training: bool) ->
 def test_frames_without_a_rest_shape_have_no_score_from_rest(
     model: DeformerNet, frames: Frames
 ) -> None:
-    restless = Frames(frames.clouds, frames.grasps, torch.zeros_like(frames.rest), frames.lengths)
-    assert errors_of(model, restless).from_rest is None
+    table = frames.table.where(~frames.table.rest)
+    errors = errors_of(model, Frames.of(table, SMALL))
+    assert errors is not None
+    assert errors.any_pair.pairs == 40
+    assert errors.from_rest is None
+
+
+def test_frames_without_a_pair_have_no_errors(model: DeformerNet, frames: Frames) -> None:
+    table = frames.table.where(frames.table.rest)
+    assert errors_of(model, Frames.of(table, SMALL)) is None
+
+
+def test_whoever_watches_is_told_of_every_pair(model: DeformerNet, frames: Frames) -> None:
+    told: list[tuple[int, int]] = []
+    squares: list[float] = []
+
+    def watch(current: Rows, goal: Rows, predicted: Tensor, true: Tensor) -> None:
+        told.extend(zip(current.tolist(), goal.tolist(), strict=True))
+        squares.extend(((1000 * (predicted - true)).square().mean(dim=1)).tolist())
+        np.testing.assert_array_equal(true, frames.motions(current, goal))
+
+    errors = errors_of(model, frames, watch=watch)
+    assert errors is not None
+    assert len(told) == len(set(told)) == 60
+    assert np.mean(squares) == pytest.approx(errors.any_pair.mse_mm2)
+
+
+def test_no_motion_is_scored_on_every_pair(model: DeformerNet, frames: Frames) -> None:
+    errors, nothing = errors_of(model, frames), no_motion(frames)
+    assert errors is not None
+    assert nothing.pairs == 60
+    assert nothing.mse_mm2 == pytest.approx(errors.any_pair.zero_mse_mm2)
