@@ -63,8 +63,8 @@ def fit(
             if first and time.monotonic() - saved > SAVE_SECONDS:
                 run.save(training)
                 saved = time.monotonic()
-        if training.stopped and training.progress < 1:
-            break
+        if training.stopped and training.stream.batch and training.progress < 1:
+            break  # within an epoch, which is judged when it has been gone on with
         if first:
             done = _judged(training, held_out, run)
             run.add(done, training.average)

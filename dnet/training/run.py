@@ -79,13 +79,12 @@ class RunWriter:
 
     def add(self, done: EpochDone, network: DeformerNet) -> None:
         """Write down an epoch and the network that it left."""
-        metrics = asdict(done)
-        self.history.append(json.loads(json.dumps(metrics)))
-        self._write_history()
-        weights = network.state_dict()
+        metrics, weights = asdict(done), network.state_dict()
         if done.best:
             save(self.path / BEST, weights, config=network.config, metrics=metrics)
         save(self.path / LAST, weights, config=network.config, metrics=metrics)
+        self.history.append(json.loads(json.dumps(metrics)))
+        self._write_history()
 
     def save(self, training: Training) -> None:
         """Put the training down, so that it can be taken up from here."""
