@@ -236,6 +236,7 @@ class Train:
         console: "Console",
     ) -> None:
         from dnet.commands.stopping import stopping
+        from dnet.commands.training_log import TrainingLog
         from dnet.commands.training_screen import TrainingBar
         from dnet.training.division import thinned
         from dnet.training.frames import Frames
@@ -246,8 +247,15 @@ class Train:
             Frames.of(thinned(table, WATCHED), config, samplings=samplings)
             for table in (division.unseen_shapes, division.unseen_episodes)
         )
-        with TrainingBar(console, epochs=self.epochs) as bar, stopping(training.stop):
-            fit(training, HeldOut(*watched), run=run, on_event=bar.show)
+        log = TrainingLog(run, board=self.tensorboard and training.process.first)
+        with TrainingBar(console, epochs=self.epochs) as bar, stopping(training.stop), log:
+            fit(
+                training,
+                HeldOut(*watched),
+                run=run,
+                on_event=bar.show,
+                on_judged=log.add,
+            )
 
 
 def _prepared(division: "Division", config: "DeformerNetConfig", console: "Console") -> "Frames":

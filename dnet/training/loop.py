@@ -1,7 +1,7 @@
 """The training loop: epoch after epoch, judged on what was held out, kept on disk as it goes."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import torch
@@ -12,6 +12,7 @@ from dnet.training.frames import Frames
 from dnet.training.progress import EpochDone, StepDone
 from dnet.training.run import RunWriter
 from dnet.training.scores import errors_of
+from dnet.training.showcase import Showcase
 from dnet.training.training import Training
 
 SAVE_SECONDS = 300.0
@@ -37,12 +38,17 @@ def _ignore(event: StepDone | EpochDone) -> None:
     del event
 
 
+def _look_away(showcases: Mapping[str, Showcase]) -> None:
+    del showcases
+
+
 def fit(
     training: Training,
     held_out: HeldOut,
     *,
     run: RunWriter,
     on_event: Callable[[StepDone | EpochDone], None] = _ignore,
+    on_judged: Callable[[Mapping[str, Showcase]], None] = _look_away,
 ) -> None:
     """Train until the last epoch, until time is up, or until someone asks for an end.
 
@@ -54,6 +60,7 @@ def fit(
         held_out: What the best network is chosen by.
         run: Where it is kept; written to by the first process alone.
         on_event: Told of every batch and every epoch.
+        on_judged: Told after every epoch of pairs of each held-out set that are worth looking at.
     """
     first = training.process.first
     saved = time.monotonic()
@@ -66,9 +73,10 @@ def fit(
         if training.stopped and training.stream.batch and training.progress < 1:
             break  # within an epoch, which is judged when it has been gone on with
         if first:
-            done = _judged(training, held_out, run)
+            done, showcases = _judged(training, held_out, run)
             run.add(done, training.average)
             on_event(done)
+            on_judged(showcases)
         else:
             training.close_epoch()
         # The others wait for the judgement with their next batch.
@@ -79,22 +87,31 @@ def fit(
         run.save(training)
 
 
-def _judged(training: Training, held_out: HeldOut, run: RunWriter) -> EpochDone:
+def _judged(
+    training: Training, held_out: HeldOut, run: RunWriter
+) -> tuple[EpochDone, dict[str, Showcase]]:
     loss, losses = training.close_epoch()
     network = training.average
-    unseen = errors_of(network, held_out.unseen_episodes)
-    if unseen is None:
+    showcases = {
+        "unseen shapes": Showcase(held_out.unseen_shapes),
+        "unseen episodes": Showcase(held_out.unseen_episodes),
+    }
+    shapes, episodes = (
+        errors_of(network, showcase.frames, watch=showcase.watch) for showcase in showcases.values()
+    )
+    if episodes is None:
         raise TooFew("number of pairs of unseen episodes", 0, 1)
-    return EpochDone(
+    done = EpochDone(
         epoch=len(run.history) + 1,
         steps=training.steps,
         loss_mm2=loss,
         losses_mm2=losses,
-        unseen_shapes=errors_of(network, held_out.unseen_shapes),
-        unseen_episodes=unseen,
-        best=unseen.any_pair.mse_mm2 < run.least,
+        unseen_shapes=shapes,
+        unseen_episodes=episodes,
+        best=episodes.any_pair.mse_mm2 < run.least,
         learning_rate=training.rate,
         seconds=training.seconds,
         waited=training.waited,
         progress=training.progress,
     )
+    return done, showcases

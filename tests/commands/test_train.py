@@ -55,6 +55,7 @@ def test_a_run_leaves_its_config_its_metrics_and_two_networks(run: Path) -> None
         "last.safetensors",
         "metrics.jsonl",
         "state.safetensors",
+        "training.rrd",
     ]
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     assert [line["epoch"] for line in lines] == [1, 2, 3]
