@@ -30,8 +30,8 @@ class Play:
     files: Annotated[
         tyro.conf.Positional[tuple[str | Path, ...]], tyro.conf.arg(metavar="FILE|DIRECTORY|URL")
     ]
-    """Episodes (`.mcap`) and runs (`.rrd`), unfinished ones (`.part`) too, and directories of
-    episodes."""
+    """Episodes (`.mcap`) and runs (`.rrd`), unfinished ones (`.part`) too, directories of
+    episodes, and those of `dnet servo` and `dnet train`."""
     episode: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ID")] = ()
     """Of a directory, open these alone: ids, or numbers of pairs; with commas or repeated."""
     filter: Annotated[str | None, tyro.conf.arg(metavar="SQL")] = None

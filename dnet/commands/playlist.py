@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from dnet.types import Place
 
 
+RECORDINGS = ("run.rrd", "training.rrd")
+"""What the directories of `dnet servo` and `dnet train` hold for the viewer."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """Which episodes of a folder are wanted; files that are named are wanted anyhow."""
@@ -40,7 +44,7 @@ def playlist(places: "Sequence[Place]", choice: Choice, console: "Console") -> "
 
     if choice.limit < 1:
         raise TooFew("--limit", choice.limit, 1)
-    known = [as_place(place) for place in places]
+    known = [_recording(as_place(place)) for place in places]
     folders = [place for place in known if _is_folder(place)]
     option = "--episode" if choice.episodes else "--filter" if choice.condition else None
     if option is not None and not folders:
@@ -52,6 +56,15 @@ def playlist(places: "Sequence[Place]", choice: Choice, console: "Console") -> "
         else:
             files.append(place)
     return files
+
+
+def _recording(place: "Place") -> "Place":
+    """Return the recording of a run, or the place itself if it is no directory of a run."""
+    if isinstance(place, Path):
+        for name in RECORDINGS:
+            if (place / name).is_file():
+                return place / name
+    return place
 
 
 def _is_folder(place: "Place") -> bool:

@@ -6,8 +6,10 @@ import pytest
 import tyro
 from PIL import Image
 from rerun.chunk import RrdReader
+from rich.console import Console
 
 from dnet.commands.play import Play
+from dnet.commands.playlist import Choice, playlist
 from dnet.errors import (
     BadCondition,
     DnetError,
@@ -53,6 +55,12 @@ def test_a_run_is_drawn_at_a_given_time(tmp_path: Path, capsys: pytest.CaptureFi
         colors = picture.convert("RGB").getcolors(1600 * 900)
         assert colors is not None
         assert len(colors) > 500
+
+
+@pytest.mark.parametrize("name", ["run.rrd", "training.rrd"])
+def test_the_directory_of_a_run_is_its_recording(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"")
+    assert playlist((tmp_path,), Choice(), Console()) == [tmp_path / name]
 
 
 def test_an_episode_is_saved_for_another_machine(
