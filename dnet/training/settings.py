@@ -16,8 +16,9 @@ an episode; `rest`: from the rest shape to the others, as in the paper."""
 
 Precision = Literal["float32", "bfloat16"]
 
-WARM_UP = 100
-"""Steps in which the learning rate comes up: Adam's first estimates are of few gradients."""
+WARM_UP, WARM_UP_SHARE = 100, 0.05
+"""Steps in which the learning rate comes up, or this share of the training if that is shorter:
+Adam's first estimates are of few gradients."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class TrainingSettings:
             progress: How much of the training is done, from 0 to 1.
             step: How many steps have been made.
         """
-        warm = min(1.0, (step + 1) / WARM_UP)
+        warm = min(1.0, max((step + 1) / WARM_UP, progress / WARM_UP_SHARE))
         if self.schedule == "step":
             return warm * self.learning_rate * 0.1 ** (int(progress * self.epochs + 1e-9) // 50)
         return warm * self.learning_rate * (1 + math.cos(math.pi * progress)) / 2
