@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Float64
 from torch import Tensor, nn
 
 from dnet.errors import BadCloud, LongCloud, ShortCloud, TooFew
+from dnet.geometry.sampling import farthest_points
 from dnet.nets.neighbourhoods import (
     GROUPINGS,
     MOST_POINTS,
@@ -19,6 +21,11 @@ from dnet.nets.neighbourhoods import (
 )
 from dnet.nets.pointconv import Norm, SetAbstraction, gather, make_norm
 from dnet.types import Cloud, Point
+
+Coordinates = Literal["world", "centred", "scaled"]
+
+UNITS: dict[Coordinates, float] = {"world": 1.0, "centred": 0.1, "scaled": 0.1}
+"""Metres that a network of each kind of coordinates sees as 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +38,19 @@ class DeformerNetConfig:
     """Normalisation: `group`, or `batch` as the paper states."""
     points: int = 2048
     """Points of a cloud."""
-    coordinate_unit: float = 0.1
-    """Metres that the network sees as 1, about the world's origin: an object's size, at which
-    the densities of PointConv tell crowded points from lonely ones."""
+    coordinates: Coordinates = "scaled"
+    """How the network sees a cloud: `world`: in metres, as in the paper; `scaled`: in units of
+    0.1 m, an object's size, at which the densities of PointConv tell crowded points from lonely
+    ones; `centred`: the same about the goal's centroid, in training about the rest shape's."""
+    density: bool = True
+    """Whether features are weighed by how crowded their points are."""
     motion_unit: float = 0.01
     """Metres that the network's output of 1 stands for: a typical motion."""
+
+    @property
+    def coordinate_unit(self) -> float:
+        """Metres that the network sees as 1."""
+        return UNITS[self.coordinates]
 
     def __post_init__(self) -> None:
         first = GROUPINGS[self.size][0]
@@ -113,6 +128,7 @@ class DeformerNet(nn.Module):
         self.config = config or DeformerNetConfig()
         self.encoder = Encoder(self.config.norm)
         self.head = Head(self.config.norm)
+        self._remembered: _Remembered | None = None
 
     def forward(self, current: Neighbourhoods, goal: Neighbourhoods) -> Float[Tensor, "b 3"]:
         """Return the motion of the grasp from each current to each goal cloud, in metres."""
@@ -134,37 +150,65 @@ class DeformerNet(nn.Module):
     def predict(self, current: Cloud, goal: Cloud) -> Point:
         """Return the motion of the grasp that would turn `current` into `goal`, in metres.
 
+        Of a cloud with more points than the network takes, the farthest from each other are
+        taken. The goal is encoded once, as long as the next call has the same one.
+
         Args:
             current: What is seen, in metres in the world frame.
             goal: What should be seen, likewise.
 
         Raises:
             ShortCloud: If a cloud has fewer points than the network takes.
-            LongCloud: If it has more.
             BadCloud: If a coordinate is NaN or infinite.
         """
-        device = next(self.parameters()).device
-        pair = [
-            prepare(cloud, self.config, what=what)
-            for what, cloud in (("current cloud", current), ("goal cloud", goal))
-        ]
         was_training = self.training
         self.eval()
         try:
-            features = self.encode(stack(pair).to(device))
-            motion = self.motion(features[:1], features[1:])[0]
+            there = self._goal_features(goal)
+            here = self._features(current, "current cloud", about=goal)
+            motion = self.motion(here, there)[0]
         finally:
             self.train(was_training)
         return motion.cpu().numpy().astype(np.float64)
 
+    def _goal_features(self, goal: Cloud) -> Float[Tensor, "1 256"]:
+        # Weights tell by their version whether they have been trained or loaded since.
+        version = sum(weights._version for weights in self.state_dict().values())
+        kept = self._remembered
+        if kept is None or kept.version != version or not np.array_equal(kept.goal, goal):
+            features = self._features(goal, "goal cloud", about=goal)
+            kept = self._remembered = _Remembered(goal.copy(), version, features)
+        return kept.features.to(self._device)
 
-def prepare(cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud") -> Neighbourhoods:
+    def _features(self, cloud: Cloud, what: str, *, about: Cloud) -> Float[Tensor, "1 256"]:
+        config = self.config
+        if len(cloud) > config.points:
+            cloud = farthest_points(cloud, config.points)
+        prepared = prepare(cloud, config, what=what, centre=centroid(about))
+        return self.encode(stack([prepared]).to(self._device))
+
+    @property
+    def _device(self) -> torch.device:
+        return next(self.parameters()).device
+
+
+class _Remembered(NamedTuple):
+    goal: Cloud
+    version: int
+    """Of the weights."""
+    features: Float[Tensor, "1 256"]
+
+
+def prepare(
+    cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud", centre: Point | None = None
+) -> Neighbourhoods:
     """Return a cloud as a network of `config` takes it.
 
     Args:
         cloud: Points in metres in the world frame.
         config: Of the network.
         what: Name of the cloud in an error.
+        centre: What becomes the origin, in metres, if coordinates are to be centred.
 
     Raises:
         ShortCloud: If the cloud has fewer points than the network takes.
@@ -178,11 +222,28 @@ def prepare(cloud: Cloud, config: DeformerNetConfig, *, what: str = "cloud") -> 
     bad = int((~np.isfinite(cloud).all(axis=1)).sum())
     if bad:
         raise BadCloud(what, bad, len(cloud))
-    return find_neighbourhoods(in_unit(cloud, config), GROUPINGS[config.size])
+    (points,) = in_unit(cloud[None], config, centres=None if centre is None else centre[None])
+    return find_neighbourhoods(points, GROUPINGS[config.size])
+
+
+def centroid(cloud: Cloud) -> Point:
+    """Return the mean of the points of a cloud."""
+    return cloud.mean(axis=0, dtype=np.float64)
 
 
 def in_unit(
-    clouds: Float32[np.ndarray, "*batch n 3"], config: DeformerNetConfig
-) -> Float32[np.ndarray, "*batch n 3"]:
-    """Return clouds in metres in the unit of a network of `config`."""
-    return (clouds / config.coordinate_unit).astype(np.float32)
+    clouds: Float32[np.ndarray, "b n 3"],
+    config: DeformerNetConfig,
+    *,
+    centres: Float64[np.ndarray, "b 3"] | None = None,
+) -> Float32[np.ndarray, "b n 3"]:
+    """Return clouds in metres in the unit of a network of `config`.
+
+    Args:
+        clouds: In the world frame.
+        config: Of the network.
+        centres: What becomes the origin of each, in metres, if coordinates are to be centred.
+    """
+    if centres is not None and config.coordinates == "centred":
+        clouds = clouds - centres[:, None].astype(np.float32)
+    return (clouds / np.float32(config.coordinate_unit)).astype(np.float32, copy=False)

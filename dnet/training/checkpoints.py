@@ -13,7 +13,7 @@ from safetensors.torch import save as save_tensors
 from torch import Tensor
 
 from dnet.errors import BadCheckpoint
-from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
 
@@ -139,16 +139,16 @@ def _config(file: Path, fields: Any) -> DeformerNetConfig:
             size=fields["size"],
             norm=fields["norm"],
             points=int(fields["points"]),
-            coordinate_unit=float(fields["coordinate_unit"]),
+            coordinates=fields["coordinates"],
+            density=bool(fields["density"]),
             motion_unit=float(fields["motion_unit"]),
         )
-        known = config.size in get_args(Size) and config.norm in get_args(Norm)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise BadCheckpoint(file, f"has an unreadable config ({error!r})", _HINT) from error
-    if not known:
-        raise BadCheckpoint(
-            file, f"is of size {config.size!r} and norm {config.norm!r}", "install a newer dnet"
-        )
+    for what, kind in (("size", Size), ("norm", Norm), ("coordinates", Coordinates)):
+        if getattr(config, what) not in get_args(kind):
+            got = getattr(config, what)
+            raise BadCheckpoint(file, f"is of {what} {got!r}", "install a newer dnet")
     return config
 
 

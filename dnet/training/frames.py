@@ -7,7 +7,7 @@ from jaxtyping import Float32, Int64
 
 from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable
-from dnet.nets.deformernet import DeformerNetConfig, in_unit
+from dnet.nets.deformernet import DeformerNetConfig
 from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.neighbour_tables import NeighbourTables
 
@@ -48,7 +48,7 @@ class Frames:
             ChangedEpisode: If a file is not the one that was indexed.
             BadTables: If the tables beside the data are not there any more, or damaged.
         """
-        clouds = in_unit(self.clouds.stack(rows), self.config)
+        clouds = self.clouds.stack(rows)[:, : self.config.points]
         return self.tables.of(rows, clouds, choices=choices)
 
     def motions(self, current: Rows, goal: Rows) -> Float32[np.ndarray, "p 3"]:

@@ -16,11 +16,13 @@ from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable
 from dnet.datasets.stores import join
 from dnet.datasets.table_cache import Records, TableCache, cache_folder
-from dnet.errors import BadTables
-from dnet.nets.deformernet import DeformerNetConfig, prepare
+from dnet.errors import BadEpisode, BadTables
+from dnet.geometry.sampling import farthest_rows
+from dnet.nets.deformernet import DeformerNetConfig, centroid, in_unit, prepare
 from dnet.nets.neighbourhoods import BANDWIDTHS, GROUPINGS, Neighbourhoods, regroup
+from dnet.types import Cloud, Place
 
-VERSION = "2"
+VERSION = "3"
 """Of how they are found: a change of `dnet.nets.neighbourhoods` that alters them raises it."""
 MOST_SAMPLINGS = 8
 """Choices of centroids of a cloud; more of them cost time and teach little more."""
@@ -64,6 +66,8 @@ class NeighbourTables:
 
         Raises:
             BadCloud: If a coordinate is NaN or infinite.
+            BadEpisode: If the network takes fewer points than a cloud has, and the points of the
+                cloud are not in farthest-point order, so that its first ones will not do.
             ChangedEpisode: If a file is not the one that was indexed.
             Unwritten: If they cannot be kept.
         """
@@ -89,7 +93,7 @@ class NeighbourTables:
 
         Args:
             rows: The frames.
-            clouds: Their clouds in the network's unit.
+            clouds: Their clouds, in metres.
             choices: Which choice of centroids to take of each; None for the usual one.
 
         Raises:
@@ -113,9 +117,8 @@ class NeighbourTables:
             if rows_below.min() < 0 or rows_below.max() >= count:
                 raise BadTables(self._cache.folder, "a row of a neighbour is beyond its cloud")
         below = torch.from_numpy(np.ascontiguousarray(found["density"]))
-        return Neighbourhoods(
-            torch.from_numpy(clouds), centroids, (one, two), (below, middle, above)
-        )
+        points = torch.from_numpy(in_unit(clouds, self.config, centres=found["centre"]))
+        return Neighbourhoods(points, centroids, (one, two), (below, middle, above))
 
     def _each(self, files: Sequence[int], workers: int) -> Iterator[int]:
         if workers <= 1:
@@ -130,16 +133,31 @@ class NeighbourTables:
         table = self.table.where(self.table.file == file)
         clouds = Clouds(table)
         records = np.zeros(len(table), self._dtype)
-        records["frame"] = table.frame
+        centre = centroid(clouds[0])
+        records["frame"], records["centre"] = table.frame, centre
         name = join(table.root, table.names[file])
         for row, frame in enumerate(table.frame.tolist()):
-            found = prepare(clouds[row], self.config, what=f"frame {frame} of {name}")
+            cloud = self._taken(clouds[row], name, frame)
+            found = prepare(cloud, self.config, what=f"frame {frame} of {name}", centre=centre)
             records["density"][row] = found.inverse_densities[0].numpy()
             for choice in range(self.samplings):
                 records["samplings"][row, choice] = self._sampled(found, frame, choice)
         clouds.close()
         self._cache.put(table.digests[file], records)
         return len(table)
+
+    def _taken(self, cloud: Cloud, name: Place, frame: int) -> Cloud:
+        """Return the points of a cloud that the network takes, the first ones."""
+        count = self.config.points
+        if count < len(cloud):
+            rows = farthest_rows(cloud, count)
+            if not np.array_equal(rows, np.arange(count)):
+                raise BadEpisode(
+                    name,
+                    f"has in frame {frame} a cloud whose points are not in farthest-point order",
+                    f"train on all {len(cloud)} points of its clouds",
+                )
+        return cloud[:count]
 
     def _sampled(self, found: Neighbourhoods, frame: int, choice: int) -> tuple[Any, ...]:
         if choice:
@@ -200,6 +218,7 @@ class NeighbourTables:
         sampled = [(name, *shape) for name, shape in zip(_SAMPLED, shapes, strict=True)]
         fields = [
             ("frame", "<i4"),
+            ("centre", "<f8", (3,)),
             ("density", "<f4", (self.config.points,)),
             ("samplings", np.dtype(sampled, align=True), (self.samplings,)),
         ]

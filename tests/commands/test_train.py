@@ -181,7 +181,11 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, from_mcap=empty), NoEpisodes, "empty holds no .mcap episode"),
         (replace(good, epochs=0), TooFew, "--epochs is 0, must be at least 1"),
         (replace(good, workers=-1), TooFew, "--workers is -1, must be at least 0"),
-        (replace(good, learning_rate=0.0), TooFew, "--learning-rate is 0.0, must be at least 1e-09"),
+        (
+            replace(good, learning_rate=0.0),
+            TooFew,
+            "--learning-rate is 0.0, must be at least 1e-09",
+        ),
         (replace(good, groups=0), TooFew, "number of groups in a batch is 0"),
         (replace(good, seed=-1), TooFew, "--seed is -1, must be at least 0"),
         (replace(good, minutes=0.0), TooShort, "--minutes is 0.0, must be above 0"),

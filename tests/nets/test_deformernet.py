@@ -182,11 +182,11 @@ def test_prediction_is_the_evaluated_network_and_leaves_it_as_it_was(
 
 def test_units_scale_what_goes_in_and_what_comes_out() -> None:
     model = network()
-    twin = DeformerNet(DeformerNetConfig(points=192, coordinate_unit=0.2, motion_unit=0.03))
+    twin = DeformerNet(DeformerNetConfig(points=192, coordinates="world", motion_unit=0.03))
     twin.load_state_dict(model.state_dict())
     current, goal = clouds(2)
     np.testing.assert_allclose(
-        twin.predict(current * 2, goal * 2), 3 * model.predict(current, goal), rtol=1e-5
+        twin.predict(current * 10, goal * 10), 3 * model.predict(current, goal), rtol=1e-5
     )
 
 
@@ -205,10 +205,43 @@ def test_a_cloud_with_too_few_points_is_refused() -> None:
         network().predict(current[:-1], goal)
 
 
-def test_a_cloud_with_too_many_points_is_refused() -> None:
+def test_of_a_larger_cloud_the_farthest_points_are_taken() -> None:
+    current, goal = clouds(2, 500)
+    model = network()
+    few = [farthest_points(cloud, 192) for cloud in (current, goal)]
+    np.testing.assert_array_equal(model.predict(current, goal), model.predict(*few))
+
+
+def test_a_goal_is_encoded_once_until_it_or_the_weights_change() -> None:
+    current, other, goal = clouds(3)
+    model = network()
+    encoded: list[int] = []
+    model.encoder.register_forward_hook(lambda *call: encoded.append(1))
+    first = model.predict(current, goal)
+    model.predict(other, goal.copy())
+    np.testing.assert_array_equal(model.predict(current, goal), first)
+    assert len(encoded) == 4
+    goal[3] += 0.01
+    assert not np.array_equal(model.predict(current, goal), first)
+    assert len(encoded) == 6
+    with torch.no_grad():
+        model.encoder.first.output_linear.weight.mul_(1.5)
+    changed = model.predict(current, goal)
+    fresh = DeformerNet(model.config)
+    fresh.load_state_dict(model.state_dict())
+    np.testing.assert_array_equal(fresh.predict(current, goal), changed)
+
+
+def test_centred_coordinates_do_not_care_where_both_clouds_are() -> None:
+    model = DeformerNet(DeformerNetConfig(points=192, coordinates="centred"))
     current, goal = clouds(2)
-    with pytest.raises(LongCloud, match="goal cloud has 193 points, the network takes 192"):
-        network().predict(current, np.vstack([goal, goal[:1]]))
+    shift = np.array([0.3, -0.2, 0.1], np.float32)
+    np.testing.assert_allclose(
+        model.predict(current + shift, goal + shift),
+        model.predict(current, goal),
+        rtol=1e-3,
+        atol=1e-6,
+    )
 
 
 @pytest.mark.parametrize(("size", "least"), [("light", 128), ("paper", 512)])

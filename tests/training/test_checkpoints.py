@@ -24,7 +24,8 @@ SOUND = {
     "size": "light",
     "norm": "group",
     "points": SMALL.points,
-    "coordinate_unit": 0.1,
+    "coordinates": "scaled",
+    "density": True,
     "motion_unit": 0.01,
 }
 
@@ -49,7 +50,7 @@ def header(**other: object) -> dict[str, str]:
 @pytest.mark.parametrize("size", ["light", "paper"])
 def test_what_was_saved_is_what_is_loaded(tmp_path: Path, size: Size, norm: Norm) -> None:
     config = DeformerNetConfig(
-        size=size, norm=norm, points=600, coordinate_unit=0.07, motion_unit=0.02
+        size=size, norm=norm, points=600, coordinates="world", motion_unit=0.02
     )
     model = new_network(config, seed=3)
     save(tmp_path / "deep" / "best.safetensors", model.state_dict(), config=config)

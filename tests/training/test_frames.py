@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,8 @@ import torch
 
 from dnet.datasets.frame_table import settled_frames
 from dnet.datasets.index import open_index
-from dnet.errors import ChangedEpisode
-from dnet.nets.deformernet import prepare
+from dnet.errors import BadEpisode, ChangedEpisode
+from dnet.nets.deformernet import centroid, prepare
 from dnet.nets.neighbourhoods import Neighbourhoods, stack
 from dnet.training.frames import Frames
 from dnet.types import FrameKind
@@ -46,6 +47,32 @@ def test_settled_frames_are_there_and_those_on_the_way_are_not(tmp_path: Path) -
     frames.tables.build()
     want = stack([prepare(box.frame(index).cloud, SMALL) for index in (0, 2, 5)])
     assert same(frames.prepared(np.arange(3)), want)
+
+
+def test_centred_frames_are_about_the_rest_shape_of_their_episode(tmp_path: Path) -> None:
+    config = replace(SMALL, coordinates="centred")
+    frames = box_frames(tmp_path, [0, 1], config=config)
+    rests = [centroid(BoxEpisode(seed).frame(0).cloud) for seed in (0, 1)]
+    shapes = [
+        prepare(BoxEpisode(seed).frame(4).cloud, config, centre=rests[seed]) for seed in (0, 1)
+    ]
+    assert same(frames.prepared(np.array([4, 10])), stack(shapes))
+
+
+def test_a_network_of_fewer_points_takes_the_first_ones(tmp_path: Path) -> None:
+    whole = box_frames(tmp_path, [0])
+    few = Frames.of(whole.table, replace(SMALL, points=140))
+    few.tables.build()
+    want = [prepare(BoxEpisode(0).frame(index).cloud[:140], few.config) for index in (0, 3)]
+    assert same(few.prepared(np.array([0, 3])), stack(want))
+
+
+def test_clouds_in_another_order_have_no_first_points_to_take(tmp_path: Path) -> None:
+    shuffled = [replace(one, cloud=one.cloud[::-1].copy()) for one in BoxEpisode(0).frames]
+    rollout.write(tmp_path / "box.mcap", shuffled)
+    frames = Frames.of(settled_frames(open_index(tmp_path)), replace(SMALL, points=140))
+    with pytest.raises(BadEpisode, match=r"not in farthest-point order; train on all 160 points"):
+        frames.tables.build()
 
 
 def test_a_motion_is_the_grasp_of_the_goal_minus_that_of_the_current_frame(frames: Frames) -> None:

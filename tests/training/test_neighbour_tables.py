@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dnet.datasets.frame_table import FrameTable, settled_frames
 from dnet.datasets.index import open_index
 from dnet.errors import BadTables
-from dnet.nets.deformernet import DeformerNetConfig, in_unit, prepare
+from dnet.nets.deformernet import DeformerNetConfig, prepare
 from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.neighbour_tables import NeighbourTables, samplings_for
 from tests.training.deforming_box import SMALL, BoxEpisode, write_boxes
@@ -21,8 +21,7 @@ def table_of(folder: Path, *seeds: int, points: int = SMALL.points) -> FrameTabl
 
 
 def first(tables: NeighbourTables, box: BoxEpisode, *, choice: int = 0) -> Neighbourhoods:
-    cloud = in_unit(box.frame(0).cloud, tables.config)
-    return tables.of(np.array([0]), cloud[None], choices=np.array([choice]))
+    return tables.of(np.array([0]), box.frame(0).cloud[None], choices=np.array([choice]))
 
 
 def files(folder: Path) -> list[Path]:
@@ -75,8 +74,7 @@ def test_part_of_a_dataset_is_read_from_the_tables_of_the_whole(tmp_path: Path) 
     table, box = table_of(tmp_path, 0), BoxEpisode(0)
     NeighbourTables(table, SMALL).build()
     part = NeighbourTables(table.where(table.frame % 2 == 1), SMALL)
-    cloud = in_unit(box.frame(3).cloud, SMALL)
-    got = part.of(np.array([1]), cloud[None])
+    got = part.of(np.array([1]), box.frame(3).cloud[None])
     want = prepare(box.frame(3).cloud, SMALL)
     assert torch.equal(got.neighbours[0][0], want.neighbours[0])
 
