@@ -63,10 +63,10 @@ class Train:
     """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
     learning_rate: float = 2e-3
     """Of Adam, at its highest (paper: 0.001)."""
-    groups: int = 4
+    groups: int = 2
     """Groups in a batch, over all processes, each of another episode as a rule."""
     frames: int = 8
-    """Clouds in a group; 4 groups of 8 are 32 encodings and 224 pairs."""
+    """Clouds in a group; 2 groups of 8 are 16 encodings and 112 pairs."""
     augment: bool = True
     """Turn and shift each group of frames about the table at random."""
     validation: float = 0.15

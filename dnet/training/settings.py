@@ -32,7 +32,7 @@ class TrainingSettings:
     seed: int = 0
     """Of the first weights, the order of batches and the augmentation."""
     pairs: PairKind = "all"
-    groups: int = 4
+    groups: int = 2
     """Groups in a batch, over all processes."""
     frames: int = 8
     """Frames in a group, all pairs of which are trained on. Of single pairs, a batch has so many

@@ -263,7 +263,9 @@ def _number(value: float | None) -> str:
 
 
 def _ratio(value: float | None, limit: float | None) -> str:
-    return "-" if value is None or not limit else f"{value / limit:.2f}"
+    if value is None or not limit:
+        return "-"
+    return f"{value / limit:.2f}" if value > limit / 10 else f"{value / limit:.1g}"
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from dnet.nets.deformernet import DeformerNet
-from dnet.nets.neighbourhoods import BANDWIDTHS, GROUPINGS
+from dnet.nets.neighbourhoods import BANDWIDTHS, GROUPINGS, Size
 from dnet.nets.pointconv import BatchNorm, GroupNorm, PointwiseLayer, SetAbstraction
 
 
@@ -68,6 +68,31 @@ def abstract(
     weights = small_net(offsets, level.weight_net)
     summed = torch.einsum("bskc,bskw->bscw", hidden, weights).flatten(2)
     return centroids, layer(summed, level.output_linear, level.output_norm)
+
+
+def farthest(points: Tensor, count: int) -> Tensor:
+    """Rows of each cloud, each the farthest from those before it, the first one first."""
+    chosen = torch.zeros(len(points), count, dtype=torch.long)
+    nearest = torch.full(points.shape[:2], torch.inf)
+    clouds = torch.arange(len(points))
+    for place in range(1, count):
+        newest = points[clouds, chosen[:, place - 1]]
+        nearest = torch.minimum(nearest, (points - newest[:, None]).square().sum(-1))
+        chosen[:, place] = nearest.argmax(-1)
+    return chosen
+
+
+def sampled(points: Tensor, size: Size) -> Tensor:
+    """Clouds whose first points are the centroids of both levels, sampled as each level would."""
+    first, second = GROUPINGS[size]
+    rows = farthest(points, first.centroids)
+    centroids = pick(points, rows)
+    above = farthest(centroids, second.centroids)
+    # The farthest of the farthest are their first ones; nothing moves, but both were looked for.
+    assert torch.equal(above, torch.arange(second.centroids).expand_as(above))
+    left = torch.ones(points.shape[:2], dtype=torch.bool).scatter_(1, rows, value=False)
+    others = left.nonzero()[:, 1].view(len(points), -1)
+    return pick(points, torch.cat([rows, others], 1))
 
 
 def encode(model: DeformerNet, points: Tensor) -> Tensor:
