@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from dnet.commands.demo import Demo
+from dnet.commands.evaluate import Evaluate
 from dnet.commands.inspect import Inspect
 from dnet.commands.play import Play
 from dnet.commands.record import Record
@@ -25,13 +26,14 @@ learn from the logs, and drive the tissue to a goal shape.
 
 `dnet COMMAND --help` teaches each."""
 
-Command = Record | Train | Servo | Play | Inspect | Demo
+Command = Record | Train | Servo | Play | Inspect | Evaluate | Demo
 COMMANDS: dict[str, type[Command]] = {
     "record": Record,
     "train": Train,
     "servo": Servo,
     "play": Play,
     "inspect": Inspect,
+    "evaluate": Evaluate,
     "demo": Demo,
 }
 

@@ -580,3 +580,10 @@ class OtherRun(DnetError, ValueError):
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+class UnknownAblation(DnetError, LookupError):
+    """A name that no ablation has."""
+
+    def __init__(self, name: str, names: list[str]) -> None:
+        super().__init__(f"there is no ablation {name!r}; there are {', '.join(names)}")

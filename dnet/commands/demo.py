@@ -65,7 +65,7 @@ class Demo:
         steps.run(
             "servo",
             f"dnet servo --checkpoint {train} --goal {goal}:{frame} --out {servo}",
-            Servo(train, f"{goal}:{frame}", servo),
+            Servo(f"{goal}:{frame}", servo, checkpoint=train),
         )
         run = servo / "run.mcap"
         steps.run("describe", f"dnet inspect info {run}", Inspect(Info(run)))

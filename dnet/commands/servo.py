@@ -23,16 +23,17 @@ class Servo:
     motion (straight line first, RRT-Connect around what blocks it) and is written to OUT/run.mcap
     and OUT/run.rrd: `dnet play OUT/run.rrd` shows the run.
 
-    Example: dnet servo --checkpoint run --goal data/episode-0-00003.mcap:7 --out servo
+    Example: dnet servo --goal data/episode-0-00003.mcap:7 --out servo
     """
 
-    checkpoint: Path
-    """Directory that `dnet train` wrote, or one of its .safetensors files."""
     goal: Annotated[str, tyro.conf.arg(metavar="EPISODE[:FRAME]")]
     """Episode file and the number of the frame to reach; without a number, its last frame.
     `dnet inspect info EPISODE` lists the frames."""
     out: Path
     """Directory for the run; made if need be, must hold none yet."""
+    checkpoint: Path | None = None
+    """Directory that `dnet train` wrote, or one of its .safetensors files; the network that
+    ships, unless given."""
     steps: int = 12
     """Motions after which the run gives up."""
     threshold: float = 0.002
@@ -50,14 +51,14 @@ class Servo:
         """
         from rich.console import Console
 
+        import dnet
         from dnet.commands.servo_log import RECORDING, ServoLog
         from dnet.laboratory import LaboratorySettings, laboratory
         from dnet.servo.loop import ServoSettings, servo
         from dnet.sim.observe import observe
-        from dnet.training.checkpoints import load
 
         self._check()
-        model = load(self.checkpoint)
+        model = dnet.load(self.checkpoint)
         goal, scene = self._read_goal(model.config.points)
         console = Console()
         with laboratory(LaboratorySettings(points=model.config.points)) as lab:
@@ -99,13 +100,14 @@ class Servo:
         from dnet.datasets.reader import EpisodeReader
         from dnet.errors import BadCheckpoint
         from dnet.types import Goal
+        from dnet.weights import DEFORMERNET
 
         path, number = split_goal(self.goal)
         with EpisodeReader(path) as episode:
             frame = episode.frame(len(episode) - 1 if number is None else number)
             if len(frame.cloud) != points:
                 raise BadCheckpoint(
-                    self.checkpoint,
+                    self.checkpoint or DEFORMERNET,
                     f"takes clouds of {points} points, the goal has {len(frame.cloud)}",
                     "use a network trained on clouds like the goal's",
                 )
@@ -113,10 +115,12 @@ class Servo:
             return Goal(frame.cloud.copy(), source), episode.meta.scene
 
     def _meta(self, lab: "Laboratory", goal: "Goal", scene: "Scene") -> "EpisodeMeta":
+        import dnet
         from dnet.types import EpisodeMeta
 
         name = f"servo-{goal.source.replace('.mcap:', '-')}"
-        run = {"goal": goal.source, "checkpoint": self.checkpoint.name}
+        checkpoint = self.checkpoint.name if self.checkpoint else f"dnet {dnet.__version__}"
+        run = {"goal": goal.source, "checkpoint": checkpoint}
         settings = lab.settings.describe() | run
         return EpisodeMeta(name, self.seed, 0, scene, settings)
 

@@ -59,6 +59,13 @@ class Train:
     """Levels of the encoder; `paper` takes seven times as long."""
     norm: Literal["group", "batch"] = "group"
     """Normalisation; `batch` is what the paper states."""
+    coordinates: Literal["scaled", "centred", "world"] = "scaled"
+    """How the network sees clouds: in units of 0.1 m, about the `world`'s origin or `centred` on
+    the object; or in metres, as in the paper."""
+    density: bool = True
+    """Weigh features by how crowded their points are."""
+    points: int | None = None
+    """Points of each cloud to take, the farthest from each other; all, unless given."""
     schedule: Literal["cosine", "step"] = "cosine"
     """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
     learning_rate: float = 2e-3
@@ -107,7 +114,6 @@ class Train:
         from dnet.commands.index_bar import read_index
         from dnet.commands.training_end import finish
         from dnet.commands.training_screen import show_data
-        from dnet.nets.deformernet import DeformerNetConfig
         from dnet.training.division import divide
         from dnet.training.run import RunWriter
 
@@ -115,7 +121,7 @@ class Train:
             process.wait()  # for the index and the tables that the first one makes
         index = read_index(self.from_mcap, console)
         division = divide(index, fraction=self.validation, seed=self.seed)
-        config = DeformerNetConfig(size=self.size, norm=self.norm, points=division.training.points)
+        config = self._network(division.training.points)
         settings = self._settings(device)
         content = self._describe(division, config, settings)
         run = RunWriter(self.out, content, resume=self.resume)
@@ -144,6 +150,20 @@ class Train:
                 raise TooFew(what, value, least)
         if self.minutes is not None and not self.minutes > 0:
             raise TooShort("--minutes", self.minutes)
+
+    def _network(self, points: int) -> "DeformerNetConfig":
+        from dnet.errors import ShortCloud
+        from dnet.nets.deformernet import DeformerNetConfig
+
+        if self.points is not None and self.points > points:
+            raise ShortCloud(points, self.points)
+        return DeformerNetConfig(
+            size=self.size,
+            norm=self.norm,
+            points=self.points or points,
+            coordinates=self.coordinates,
+            density=self.density,
+        )
 
     def _settings(self, device: "torch.device") -> "TrainingSettings":
         import torch

@@ -58,6 +58,7 @@ def finish(
             errors[name] = errors_of(
                 network, judged, on_clouds=lambda done: bar.advance(task, done)
             )
+    run.add_errors(errors)
     write_card(run, errors)
     out.print(error_table(errors))
     console.print(_closing_line(training, run))

@@ -76,9 +76,11 @@ class TrainingBar:
             bar.update(task, loss=f"{event.loss_mm2:.1f}", validation=validation)
 
 
-def error_table(errors: Mapping[str, Errors | None]) -> Table:
+def error_table(
+    errors: Mapping[str, Errors | None], *, title: str = "errors of the best network"
+) -> Table:
     """Return the errors on each set of frames as a table."""
-    table = Table(title="errors of the best network")
+    table = Table(title=title)
     names = ("frames of", "pairs", "count", "MSE", "sum", "error", "R²", "no motion")
     for name in names:
         table.add_column(name, justify="left" if name in ("frames of", "pairs") else "right")

@@ -11,13 +11,15 @@ from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream
 from dnet.nets.deformernet import DeformerNet
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
 from dnet.training.progress import EpochDone
+from dnet.training.scores import Errors
 from dnet.training.training import Training
 
-LAST, CONFIG, METRICS, STATE = (
+LAST, CONFIG, METRICS, STATE, ERRORS = (
     "last.safetensors",
     "config.json",
     "metrics.jsonl",
     "state.safetensors",
+    "errors.json",
 )
 
 
@@ -86,6 +88,11 @@ class RunWriter:
         self.history.append(json.loads(json.dumps(metrics)))
         self._write_history()
 
+    def add_errors(self, errors: Mapping[str, Errors | None]) -> None:
+        """Write down the errors of the best network on everything, by what they are on."""
+        found = {name: asdict(of) for name, of in errors.items() if of is not None}
+        write_json(self.path / ERRORS, found)
+
     def save(self, training: Training) -> None:
         """Put the training down, so that it can be taken up from here."""
         write_json(self.path / CONFIG, self.content)
@@ -110,6 +117,15 @@ class RunWriter:
         part = self.path / f".{METRICS}.part"
         part.write_text("".join(json.dumps(line) + "\n" for line in self.history), "utf-8")
         part.replace(self.path / METRICS)
+
+
+def is_finished(run: Path) -> bool:
+    """Return whether the training in a directory has come to its end."""
+    try:
+        last = (run / METRICS).read_text(encoding="utf-8").splitlines()[-1]
+        return (run / ERRORS).exists() and json.loads(last)["progress"] >= 1
+    except (OSError, ValueError, KeyError, IndexError):
+        return False
 
 
 def read_config(run: Path) -> dict[str, Any]:

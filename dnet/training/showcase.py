@@ -67,7 +67,8 @@ class Showcase:
     @property
     def motions(self) -> tuple[Float[Tensor, "_ 3"], Float[Tensor, "_ 3"]]:
         """Predicted and true motions of the pairs that were kept, in metres."""
-        return torch.cat(self._predicted), torch.cat(self._true)
+        none = torch.zeros(0, 3)
+        return torch.cat([none, *self._predicted]), torch.cat([none, *self._true])
 
     def worst(self) -> list[Pair]:
         """Return the worst pairs, each of another episode, the worst first."""

@@ -52,6 +52,7 @@ def test_a_run_leaves_its_config_its_metrics_and_two_networks(run: Path) -> None
         "MODEL_CARD.md",
         "best.safetensors",
         "config.json",
+        "errors.json",
         "last.safetensors",
         "metrics.jsonl",
         "state.safetensors",

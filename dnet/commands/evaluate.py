@@ -1,0 +1,152 @@
+"""`dnet evaluate`: experiments, each a function of logs and a seed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from dnet.commands.train import Train
+
+
+@dataclass(frozen=True)
+class Ablations:
+    """Train the network many times, one choice apart, and compare the errors in a table.
+
+    Every training has the same time; what it comes to on unseen shapes and on unseen episodes is
+    written to OUT/ablations.md. Each is a run of its own in OUT, with the options of `dnet train`
+    that differ in its config.json. Stopped, the same call goes on. Let nothing else run meanwhile:
+    what a training gets done in its time counts.
+
+    Example: dnet evaluate ablations --from-mcap data/paper --out ablations --minutes 5
+    """
+
+    from_mcap: Path
+    """Directory with episodes of `dnet record`."""
+    out: Path
+    """Directory for the runs and the table."""
+    minutes: float = 5.0
+    """Time of each training."""
+    only: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
+    """Train these alone; repeated. The table tells their names."""
+    validation: float = 0.15
+    """Share of the episodes to hold out, and of the shapes of the others."""
+    seed: int = 0
+    """Of every training."""
+
+    def run(self) -> None:
+        """Train whatever is not there yet, and print the table.
+
+        Raises:
+            DnetError: If the episodes or the directory will not do, or a name is unknown.
+        """
+        from rich.console import Console
+        from rich.markdown import Markdown
+
+        from dnet.errors import UnknownAblation
+        from dnet.evaluation.ablations import ABLATIONS, read_ablation, table_of
+        from dnet.training.run import is_finished
+
+        for name in self.only:
+            if name not in ABLATIONS:
+                raise UnknownAblation(name, list(ABLATIONS))
+        found = []
+        console = Console(stderr=True)
+        for number, name in enumerate(names := self.only or tuple(ABLATIONS), start=1):
+            console.print(f"[bold]{number}/{len(names)} {name}[/bold]", highlight=False)
+            run = self.out / name.replace(",", "").replace(" ", "-")
+            if not is_finished(run):
+                self._train(run, name)
+            if not is_finished(run):
+                console.print("stopped; the same call goes on")
+                return
+            found.append(read_ablation(name, run))
+        table = table_of(found)
+        part = self.out / ".ablations.md.part"
+        part.write_text(table, encoding="utf-8")
+        part.replace(self.out / "ablations.md")
+        Console().print(Markdown(table))
+
+    def _train(self, run: Path, name: str) -> None:
+        from dataclasses import replace
+
+        from dnet.evaluation.ablations import ABLATIONS
+
+        plain = Train(
+            self.from_mcap,
+            run,
+            resume=True,
+            epochs=100_000,
+            minutes=self.minutes,
+            validation=self.validation,
+            seed=self.seed,
+        )
+        replace(plain, **ABLATIONS[name]).run()
+
+
+@dataclass(frozen=True)
+class Network:
+    """Judge a trained network on all pairs of a dataset's settled frames.
+
+    The dataset may be any: other objects, another world, other people's clouds.
+
+    Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
+    """
+
+    from_mcap: Path
+    """Directory with episodes."""
+    checkpoint: Path | None = None
+    """Directory of `dnet train`, or one of its .safetensors files; the network that ships, unless
+    given."""
+    json: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print JSON instead of a table."""
+
+    def run(self) -> None:
+        """Judge, with a progress bar, and print the errors.
+
+        Raises:
+            DnetError: If the network or the episodes will not do.
+        """
+        from dataclasses import asdict
+        from json import dumps
+
+        from rich.console import Console
+
+        import dnet
+        from dnet.commands.index_bar import read_index
+        from dnet.commands.progress import progress
+        from dnet.commands.training_screen import error_table
+        from dnet.datasets.frame_table import settled_frames
+        from dnet.training.frames import Frames
+        from dnet.training.scores import errors_of
+
+        console = Console(stderr=True)
+        model = dnet.load(self.checkpoint)
+        table = settled_frames(read_index(self.from_mcap, console))
+        frames = Frames.of(table, model.config)
+        with progress(console, "clouds") as bar:
+            task = bar.add_task("finding neighbours", total=len(table))
+            frames.tables.build(on_clouds=lambda done: bar.advance(task, done))
+            task = bar.add_task("judging", total=len(table))
+            errors = errors_of(model, frames, on_clouds=lambda done: bar.advance(task, done))
+        if self.json:
+            print(dumps(None if errors is None else asdict(errors), indent=2))
+        else:
+            Console().print(error_table({self.from_mcap.name: errors}, title="errors"))
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Measure: a `network` on a dataset, or what each choice in its training is worth.
+
+    Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
+    """
+
+    experiment: tyro.conf.OmitSubcommandPrefixes[
+        Annotated[Network, tyro.conf.subcommand("network")]
+        | Annotated[Ablations, tyro.conf.subcommand("ablations")]
+    ]
+
+    def run(self) -> None:
+        """Run the experiment."""
+        self.experiment.run()

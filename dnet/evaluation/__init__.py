@@ -1,0 +1,1 @@
+"""Experiments whose figures can be computed again from what they leave on disk."""
