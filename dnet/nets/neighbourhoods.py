@@ -159,13 +159,16 @@ def _inverse_density(points: Cloud, bandwidth: float) -> Float32[Tensor, "_"]:
     """
     x, y, z = np.ascontiguousarray(points.T)
     exponent = np.float32(-1 / (2 * bandwidth**2))
-    densities = np.empty(len(points), dtype=np.float32)
+    sums = np.zeros(len(points), dtype=np.float32)
     for first in range(0, len(points), _ROWS):
-        rows = points[first : first + _ROWS]
-        squares = np.square(rows[:, :1] - x)
-        squares += np.square(rows[:, 1:2] - y)
-        squares += np.square(rows[:, 2:] - z)
+        last = min(first + _ROWS, len(points))
+        rows = points[first:last]
+        # Each two points meet once: those before have met these rows already.
+        squares = np.square(rows[:, :1] - x[first:])
+        squares += np.square(rows[:, 1:2] - y[first:])
+        squares += np.square(rows[:, 2:] - z[first:])
         squares *= exponent
         kernel = np.exp(squares, out=squares)
-        densities[first : first + _ROWS] = kernel.mean(axis=1) / (2.5 * bandwidth)
-    return torch.from_numpy(1 / densities)
+        sums[first:last] += kernel.sum(axis=1)
+        sums[last:] += kernel[:, last - first :].sum(axis=0)
+    return torch.from_numpy(np.float32(2.5 * bandwidth) * np.float32(len(points)) / sums)
