@@ -2,31 +2,34 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from dnet.commands.train import Train
+
+if TYPE_CHECKING:
+    from dnet.datasets.index import Index
+    from dnet.training.settings import PairKind
 
 
 @dataclass(frozen=True)
 class Ablations:
     """Train the network many times, one choice apart, and compare the errors in a table.
 
-    Every training has the same time; what it comes to on unseen shapes and on unseen episodes is
-    written to OUT/ablations.md. Each is a run of its own in OUT, with the options of `dnet train`
-    that differ in its config.json. Stopped, the same call goes on. Let nothing else run meanwhile:
-    what a training gets done in its time counts.
+    Every training encodes as many clouds; what it comes to on unseen shapes and on unseen episodes
+    is written to OUT/ablations.md. Each is a run of its own in OUT, whose config.json tells all
+    options. Stopped, the same call goes on.
 
-    Example: dnet evaluate ablations --from-mcap data/paper --out ablations --minutes 5
+    Example: dnet evaluate ablations --from-mcap data/paper --out ablations
     """
 
     from_mcap: Path
     """Directory with episodes of `dnet record`."""
     out: Path
     """Directory for the runs and the table."""
-    minutes: float = 5.0
-    """Time of each training."""
+    encodings: int = 60_000
+    """Clouds that each training encodes: twice a pair, or once for all pairs of a group."""
     only: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
     """Train these alone; repeated. The table tells their names."""
     validation: float = 0.15
@@ -43,20 +46,24 @@ class Ablations:
         from rich.console import Console
         from rich.markdown import Markdown
 
-        from dnet.errors import UnknownAblation
+        from dnet.commands.index_bar import read_index
+        from dnet.errors import TooFew, UnknownAblation
         from dnet.evaluation.ablations import ABLATIONS, read_ablation, table_of
         from dnet.training.run import is_finished
 
         for name in self.only:
             if name not in ABLATIONS:
                 raise UnknownAblation(name, list(ABLATIONS))
+        if self.encodings < 1:
+            raise TooFew("--encodings", self.encodings, 1)
         found = []
         console = Console(stderr=True)
+        index = read_index(self.from_mcap, console)
         for number, name in enumerate(names := self.only or tuple(ABLATIONS), start=1):
             console.print(f"[bold]{number}/{len(names)} {name}[/bold]", highlight=False)
             run = self.out / name.replace(",", "").replace(" ", "-")
             if not is_finished(run):
-                self._train(run, name)
+                self._train(run, name, index)
             if not is_finished(run):
                 console.print("stopped; the same call goes on")
                 return
@@ -67,7 +74,19 @@ class Ablations:
         part.replace(self.out / "ablations.md")
         Console().print(Markdown(table))
 
-    def _train(self, run: Path, name: str) -> None:
+    def _epochs(self, index: "Index", pairs: "PairKind") -> float:
+        """Return how many epochs it takes to encode as many clouds as are wanted."""
+        from dnet.training.division import divide, pairs_of
+
+        table = divide(index, fraction=self.validation, seed=self.seed).training
+        an_epoch = {
+            "all": len(table),
+            "any": 2 * pairs_of(table),
+            "rest": 2 * int((~table.rest).sum()),
+        }
+        return self.encodings / an_epoch[pairs]
+
+    def _train(self, run: Path, name: str, index: "Index") -> None:
         from dataclasses import replace
 
         from dnet.evaluation.ablations import ABLATIONS
@@ -76,8 +95,7 @@ class Ablations:
             self.from_mcap,
             run,
             resume=True,
-            epochs=100_000,
-            minutes=self.minutes,
+            epochs=self._epochs(index, ABLATIONS[name].get("pairs", "all")),
             validation=self.validation,
             seed=self.seed,
         )

@@ -47,8 +47,9 @@ class Train:
     resume: bool = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. Everything else must be as it was."""
-    epochs: int = 100
-    """How often every frame is seen (paper: 100, of 30,000 frames)."""
+    epochs: int | float = 100
+    """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
+    frames)."""
     minutes: float | None = None
     """Stop in this time even so. The schedule then follows the clock, and a second training on
     the same data ends in slightly different weights."""
@@ -141,7 +142,7 @@ class Train:
         from dnet.errors import TooFew, TooShort
 
         for what, value, least in (
-            ("--epochs", self.epochs, 1),
+            ("--epochs", self.epochs, 1e-9),
             ("--seed", self.seed, 0),
             ("--workers", self.workers, 0),
             ("--learning-rate", self.learning_rate, 1e-9),

@@ -41,7 +41,7 @@ def show_data(console: Console, division: Division, training: Frames) -> None:
 class TrainingBar:
     """A progress bar that tells the epoch and the latest errors, for use in a `with`."""
 
-    def __init__(self, console: Console, *, epochs: int) -> None:
+    def __init__(self, console: Console, *, epochs: int | float) -> None:
         self._epochs = epochs
         self._progress = Progress(
             TextColumn("epoch {task.fields[epoch]}"),
@@ -70,7 +70,7 @@ class TrainingBar:
     def show(self, event: StepDone | EpochDone) -> None:
         """Move on to `event`."""
         bar, task = self._progress, self._task
-        bar.update(task, completed=event.progress, epoch=f"{event.epoch}/{self._epochs}")
+        bar.update(task, completed=event.progress, epoch=f"{event.epoch}/{self._epochs:g}")
         if isinstance(event, EpochDone):
             validation = f"{event.unseen_episodes.any_pair.mse_mm2:.1f} mm²"
             bar.update(task, loss=f"{event.loss_mm2:.1f}", validation=validation)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint
-from dnet.training.run import CONFIG, ERRORS, METRICS
+from dnet.training.run import ERRORS, METRICS
 
 ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "as by default": {},
@@ -63,19 +63,12 @@ def read_ablation(name: str, run: Path) -> Ablation:
         BadCheckpoint: If it is not finished, or unreadable.
     """
     try:
-        errors, config, last = (
-            json.loads(text)
-            for text in (
-                (run / ERRORS).read_text("utf-8"),
-                (run / CONFIG).read_text("utf-8"),
-                (run / METRICS).read_text("utf-8").splitlines()[-1],
-            )
-        )
-        settings = config["training"]
+        errors = json.loads((run / ERRORS).read_text("utf-8"))
+        last = json.loads((run / METRICS).read_text("utf-8").splitlines()[-1])
         shapes, episodes = errors["unseen shapes"], errors["unseen episodes"]
         return Ablation(
             name,
-            last["steps"] * settings["groups"] * settings["frames"],
+            int(last["encodings"]),
             *(
                 float(of[pairs]["mse_mm2"])
                 for of in (shapes, episodes)

@@ -104,6 +104,7 @@ def _judged(
     done = EpochDone(
         epoch=len(run.history) + 1,
         steps=training.steps,
+        encodings=training.encodings,
         loss_mm2=loss,
         losses_mm2=losses,
         unseen_shapes=shapes,

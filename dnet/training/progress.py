@@ -29,6 +29,8 @@ class EpochDone:
     """From 1."""
     steps: int
     """Batches since the training began."""
+    encodings: int
+    """Clouds that were encoded in them."""
     loss_mm2: float
     """Mean over the epoch's batches; they come augmented and from weights in motion."""
     losses_mm2: tuple[float, ...]

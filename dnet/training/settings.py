@@ -25,7 +25,8 @@ Adam's first estimates are of few gradients."""
 class TrainingSettings:
     """How to train."""
 
-    epochs: int = 100
+    epochs: int | float = 100
+    """How often everything is learned from; the last time perhaps in part."""
     learning_rate: float = 2e-3
     """Of Adam, at its highest."""
     schedule: Schedule = "cosine"
@@ -48,7 +49,7 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         for what, got, least in (
-            ("number of epochs", self.epochs, 1),
+            ("number of epochs", self.epochs, 1e-9),
             ("number of groups in a batch", self.groups, 1),
             ("number of frames in a group", self.frames, 2),
         ):

@@ -73,6 +73,8 @@ class Training:
         self.limit = seconds
         self.steps = 0
         """Batches so far."""
+        self.encodings = 0
+        """Clouds encoded so far, by all processes."""
         self.waited = 0.0
         """Seconds spent waiting for the loader."""
         self.losses: list[float] = []
@@ -148,9 +150,15 @@ class Training:
         # In the network's unit, errors and so gradients are near 1.
         unit = self.model.config.motion_unit
         squares = (predicted.float() - batch.motions / unit).square().sum()
-        told = (batch.motions.numel(), squares.item(), self.seconds, self._asked)
+        told = (
+            batch.motions.numel(),
+            squares.item(),
+            len(batch.clouds.points),
+            self.seconds,
+            self._asked,
+        )
         total = torch.tensor(told, dtype=torch.float64, device=self._device)
-        numbers, error, seconds, asked = self.process.sum(total).tolist()
+        numbers, error, clouds, seconds, asked = self.process.sum(total).tolist()
         # Clocks differ, and learning rates must not.
         self._elapsed, self.stopped = seconds / self.process.world, asked > 0
         # Processes average gradients; what is wanted is the mean over the pairs of all of them.
@@ -159,6 +167,7 @@ class Training:
         self._optimizer.step()
         self._average.update_parameters(self.model)
         self.steps += 1
+        self.encodings += int(clouds)
         return error / numbers * (unit * 1000) ** 2
 
     def _progress(self, batches: int) -> float:
@@ -187,6 +196,7 @@ class Training:
         return {
             "stream": self.stream.state_dict(),
             "steps": self.steps,
+            "encodings": self.encodings,
             "losses": self.losses,
             "seconds": self.seconds,
             "waited": self.waited,
@@ -212,6 +222,7 @@ class Training:
         state = self._optimizer.state_dict()
         self._optimizer.load_state_dict({**state, "state": moments})
         self.stream.load_state_dict(dict(facts["stream"]))
-        self.steps, self.losses = int(facts["steps"]), [float(loss) for loss in facts["losses"]]
+        self.steps, self.encodings = int(facts["steps"]), int(facts["encodings"])
+        self.losses = [float(loss) for loss in facts["losses"]]
         self._before, self.waited = float(facts["seconds"]), float(facts["waited"])
         self._elapsed, self._began = self._before, time.monotonic()

@@ -19,7 +19,7 @@ def test_ablations_end_as_a_table_and_are_not_made_again(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     only = ("as by default", "from rest, single pairs")
-    command = Ablations(data, tmp_path, minutes=0.02, only=only, validation=0.3)
+    command = Ablations(data, tmp_path, encodings=64, only=only, validation=0.3)
     Evaluate(command).run()
     table = (tmp_path / "ablations.md").read_text()
     assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == [
@@ -27,6 +27,9 @@ def test_ablations_end_as_a_table_and_are_not_made_again(
     ]
     config = json.loads((tmp_path / "from-rest-single-pairs" / "config.json").read_text())
     assert config["training"]["pairs"] == "rest"
+    rows = [line.split(" | ") for line in table.splitlines()[2:]]
+    # To a batch.
+    assert all(64 <= int(row[1]) < 64 + 18 for row in rows)
     made = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.safetensors")}
     Evaluate(command).run()
     assert (tmp_path / "ablations.md").read_text() == table

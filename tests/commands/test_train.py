@@ -180,7 +180,7 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
     return [
         (replace(good, from_mcap=tmp_path / "none"), MissingPath, "none does not exist"),
         (replace(good, from_mcap=empty), NoEpisodes, "empty holds no .mcap episode"),
-        (replace(good, epochs=0), TooFew, "--epochs is 0, must be at least 1"),
+        (replace(good, epochs=0), TooFew, "--epochs is 0, must be at least 1e-09"),
         (replace(good, workers=-1), TooFew, "--workers is -1, must be at least 0"),
         (
             replace(good, learning_rate=0.0),

@@ -40,7 +40,18 @@ def begin(frames: Frames) -> Training:
 def epoch(number: int, *, best: bool) -> EpochDone:
     errors = Errors(score(torch.ones(2, 3) * number, torch.eye(3)[:2]), None)
     return EpochDone(
-        number, 5 * number, 1.0, (2.0, 0.5), None, errors, best, 1e-3, 2.0, 0.1, number / 2
+        number,
+        5 * number,
+        80 * number,
+        1.0,
+        (2.0, 0.5),
+        None,
+        errors,
+        best,
+        1e-3,
+        2.0,
+        0.1,
+        number / 2,
     )
 
 

@@ -52,7 +52,7 @@ def test_a_batch_encodes_as_many_clouds_whatever_its_pairs() -> None:
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [
-        ({"epochs": 0}, "number of epochs is 0, must be at least 1"),
+        ({"epochs": 0}, "number of epochs is 0, must be at least 1e-09"),
         ({"groups": 0}, "number of groups in a batch is 0, must be at least 1"),
         ({"frames": 1}, "number of frames in a group is 1, must be at least 2"),
     ],

@@ -4,10 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 
 CALLED = """
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 
 @compiled
 def step(x):
@@ -15,7 +15,7 @@ def step(x):
 """
 CALLING = """
 from called import step
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 
 @compiled
 def climb(x):
