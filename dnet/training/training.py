@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, cast
 
@@ -178,7 +178,9 @@ class Training:
         low = self.settings.precision == "bfloat16"
         return torch.autocast(self._device.type, torch.bfloat16, enabled=low)
 
-    def _averaged(self, averages: list[Tensor], weights: list[Tensor], count: Tensor | int) -> None:
+    def _averaged(
+        self, averages: Sequence[Tensor], weights: Sequence[Tensor], count: Tensor | int
+    ) -> None:
         share = 1 - self.settings.kept(int(count))
         for average, weight in zip(averages, weights, strict=True):
             average.lerp_(weight.to(average.dtype), share)

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 from itertools import islice
 
@@ -24,10 +25,16 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
 
 
 def begin(
-    frames: Frames, settings: TrainingSettings = SETTINGS, *, workers: int = 0, **limit: float
+    frames: Frames,
+    settings: TrainingSettings = SETTINGS,
+    *,
+    workers: int = 0,
+    seconds: float = math.inf,
 ) -> Training:
     stream = stream_of(frames, settings, process=Process(), workers=workers)
-    return Training(new_network(frames.config, seed=settings.seed), stream, settings, **limit)
+    return Training(
+        new_network(frames.config, seed=settings.seed), stream, settings, seconds=seconds
+    )
 
 
 def run(training: Training) -> list[float]:
@@ -61,7 +68,7 @@ def test_a_training_goes_on_as_if_it_had_never_been_put_down(frames: Frames, bat
     whole = begin(frames)
     losses = run(whole)
     first = begin(frames)
-    begun = []
+    begun: list[float] = []
     while len(begun) < batches:
         begun += [step.loss_mm2 for step in islice(first.epoch(), batches - len(begun))]
         if first.stream.batch == 0:
