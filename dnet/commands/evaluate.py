@@ -24,8 +24,8 @@ class Ablations:
     Example: dnet evaluate ablations --from-mcap data/paper --out ablations
     """
 
-    from_mcap: Path
-    """Directory with episodes of `dnet record`."""
+    from_mcap: Annotated[str | Path, tyro.conf.arg(metavar="DIRECTORY|URL")]
+    """Episodes."""
     out: Path
     """Directory for the runs and the table."""
     encodings: int = 60_000
@@ -47,6 +47,7 @@ class Ablations:
         from rich.markdown import Markdown
 
         from dnet.commands.index_bar import read_index
+        from dnet.datasets.stores import as_place
         from dnet.errors import TooFew, UnknownAblation
         from dnet.evaluation.ablations import ABLATIONS, read_ablation, table_of
         from dnet.training.run import is_finished
@@ -58,7 +59,7 @@ class Ablations:
             raise TooFew("--encodings", self.encodings, 1)
         found = []
         console = Console(stderr=True)
-        index = read_index(self.from_mcap, console)
+        index = read_index(as_place(self.from_mcap), console)
         for number, name in enumerate(names := self.only or tuple(ABLATIONS), start=1):
             console.print(f"[bold]{number}/{len(names)} {name}[/bold]", highlight=False)
             run = self.out / name.replace(",", "").replace(" ", "-")
@@ -111,8 +112,8 @@ class Network:
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
 
-    from_mcap: Path
-    """Directory with episodes."""
+    from_mcap: Annotated[str | Path, tyro.conf.arg(metavar="DIRECTORY|URL")]
+    """Episodes."""
     checkpoint: Path | None = None
     """Directory of `dnet train`, or one of its .safetensors files; the network that ships, unless
     given."""
@@ -135,12 +136,14 @@ class Network:
         from dnet.commands.progress import progress
         from dnet.commands.training_screen import error_table
         from dnet.datasets.frame_table import settled_frames
+        from dnet.datasets.stores import as_place
         from dnet.training.frames import Frames
         from dnet.training.scores import errors_of
 
         console = Console(stderr=True)
         model = dnet.load(self.checkpoint)
-        table = settled_frames(read_index(self.from_mcap, console))
+        table = settled_frames(read_index(as_place(self.from_mcap), console))
+        name = str(self.from_mcap).rstrip("/").rsplit("/", 1)[-1]
         frames = Frames.of(table, model.config)
         with progress(console, "clouds") as bar:
             task = bar.add_task("finding neighbours", total=len(table))
@@ -150,7 +153,7 @@ class Network:
         if self.json:
             print(dumps(None if errors is None else asdict(errors), indent=2))
         else:
-            Console().print(error_table({self.from_mcap.name: errors}, title="errors"))
+            Console().print(error_table({name: errors}, title="errors"))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ import math
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
 
 if TYPE_CHECKING:
     import torch
@@ -40,11 +42,11 @@ class Train:
     On several processes or machines: torchrun --nproc-per-node 2 --no-python dnet train ...
     """
 
-    from_mcap: Path
-    """Directory with episodes of `dnet record`; two or more."""
+    from_mcap: Annotated[str | Path, tyro.conf.arg(metavar="DIRECTORY|URL")]
+    """Episodes of `dnet record`, two or more; read from where they lie, be it an object store."""
     out: Path
     """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
-    resume: bool = False
+    resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. Everything else must be as it was."""
     epochs: int | float = 100
@@ -87,7 +89,7 @@ class Train:
     """Of activations; `auto` takes bfloat16 on a GPU that computes with it."""
     workers: int = 0
     """Processes that read ahead; none is fastest on a CPU. The order is the same with any."""
-    tensorboard: bool = False
+    tensorboard: tyro.conf.FlagCreatePairsOff[bool] = False
     """Also write RUN/tensorboard (pip install deformernet[tensorboard])."""
 
     def run(self) -> None:
@@ -115,12 +117,13 @@ class Train:
         from dnet.commands.index_bar import read_index
         from dnet.commands.training_end import finish
         from dnet.commands.training_screen import show_data
+        from dnet.datasets.stores import as_place
         from dnet.training.division import divide
         from dnet.training.run import RunWriter
 
         if not process.first:
             process.wait()  # for the index and the tables that the first one makes
-        index = read_index(self.from_mcap, console)
+        index = read_index(as_place(self.from_mcap), console)
         division = divide(index, fraction=self.validation, seed=self.seed)
         config = self._network(division.training.points)
         settings = self._settings(device)
