@@ -6,14 +6,14 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from dnet.errors import MissingExtra
-from dnet.recorders.training_recording import (
+from dnet.recorders.training_recording import write_training
+from dnet.recorders.training_values import (
     EpochPoint,
     LossPoint,
     Motions,
     RatePoint,
     SetErrors,
     WorstSample,
-    write_training,
 )
 from dnet.training.run import RunWriter
 from dnet.training.showcase import Showcase

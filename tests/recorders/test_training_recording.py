@@ -8,14 +8,14 @@ import pytest
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from dnet.recorders.training_recording import (
+from dnet.recorders.training_recording import write_training
+from dnet.recorders.training_values import (
     EpochPoint,
     LossPoint,
     Motions,
     RatePoint,
     SetErrors,
     WorstSample,
-    write_training,
 )
 from dnet.recorders.viewer import RERUN, draw
 from tests.recorders.rollout import frames
