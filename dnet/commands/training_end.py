@@ -41,8 +41,8 @@ def finish(
     from dnet.training.model_card import write_card
     from dnet.training.scores import Errors, errors_of
 
-    if not run.history:
-        console.print(f"stopped before the first epoch was over; --resume goes on with {run.path}")
+    if training.stopped and training.progress < 1:
+        console.print(_stopped_line(training, run))
         return
     network = load(run.path).to(next(training.model.parameters()).device)
     parts = {
@@ -65,10 +65,22 @@ def finish(
 
 
 def _closing_line(training: "Training", run: "RunWriter") -> str:
-    best = min(run.history, key=lambda line: line["unseen_episodes"]["any_pair"]["mse_mm2"])
-    ended = "interrupted, --resume goes on; " if training.stopped else ""
     waited = 100 * training.waited / max(training.seconds, 1e-9)
     return (
-        f"{ended}{len(run.history)} epochs in {training.seconds:.0f} s, {waited:.1f} % of it "
-        f"waiting for clouds; the best was epoch {best['epoch']}; wrote {run.path}"
+        f"{len(run.history)} epochs in {training.seconds:.0f} s, {waited:.1f} % of it waiting for "
+        f"clouds; {_best_line(run)}wrote {run.path}"
     )
+
+
+def _stopped_line(training: "Training", run: "RunWriter") -> str:
+    return (
+        f"interrupted after {training.steps} batches, {training.seconds:.0f} s; {_best_line(run)}"
+        f"--resume goes on with {run.path}"
+    )
+
+
+def _best_line(run: "RunWriter") -> str:
+    if not run.history:
+        return ""
+    best = min(run.history, key=lambda line: line["unseen_episodes"]["any_pair"]["mse_mm2"])
+    return f"the best was epoch {best['epoch']}; "
