@@ -4,14 +4,28 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from dnet.compiled import compiled
 
 CALLED = """
-from dnet.compiled import compiled
+from dnet.compiled import compiled, compiled_part
 
-@compiled
+@{decorator}
 def step(x):
     return x + {step}
+"""
+INTRINSIC = """
+from numba.extending import intrinsic
+from dnet.compiled import holds_parts
+
+holds_parts(__file__)
+
+@intrinsic
+def step(typing, x):
+    def generate(context, builder, signature, args):
+        return builder.add(args[0], args[0].type({step}))
+    return x(x), generate
 """
 CALLING = """
 from called import step
@@ -34,7 +48,15 @@ def test_a_kernel_without_a_place_for_its_cache_is_compiled_all_the_same() -> No
     assert kernel(float("inf")) == float("inf")
 
 
-def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "called",
+    [
+        CALLED.replace("{decorator}", "compiled"),
+        CALLED.replace("{decorator}", "compiled_part"),
+        INTRINSIC,
+    ],
+)
+def test_a_change_in_another_module_is_noticed(called: str, tmp_path: Path) -> None:
     def climbed() -> str:
         code = "from calling import climb; print(climb(0))"
         command = [sys.executable, "-c", code]
@@ -43,10 +65,10 @@ def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:
         ).stdout.strip()
 
     (tmp_path / "calling.py").write_text(CALLING)
-    (tmp_path / "called.py").write_text(CALLED.format(step=1))
+    (tmp_path / "called.py").write_text(called.format(step=1))
     assert climbed() == "2"
     kept = set(tmp_path.glob("__pycache__/calling.climb*.nbi"))
     assert len(kept) == 1, "the machine code is kept"
     assert climbed() == "2"
-    (tmp_path / "called.py").write_text(CALLED.format(step=10))
+    (tmp_path / "called.py").write_text(called.format(step=10))
     assert climbed() == "20"

@@ -66,11 +66,11 @@ class Encoder(nn.Module):
 
     features = 256
 
-    def __init__(self, norm: Norm) -> None:
+    def __init__(self, norm: Norm, *, density: bool = True) -> None:
         super().__init__()
-        self.first = SetAbstraction(3, 64, norm)
-        self.second = SetAbstraction(64, 128, norm)
-        self.third = SetAbstraction(128, self.features, norm)
+        self.first = SetAbstraction(3, 64, norm, density=density)
+        self.second = SetAbstraction(64, 128, norm, density=density)
+        self.third = SetAbstraction(128, self.features, norm, density=density)
 
     def forward(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch."""
@@ -126,7 +126,7 @@ class DeformerNet(nn.Module):
     def __init__(self, config: DeformerNetConfig | None = None) -> None:
         super().__init__()
         self.config = config or DeformerNetConfig()
-        self.encoder = Encoder(self.config.norm)
+        self.encoder = Encoder(self.config.norm, density=self.config.density)
         self.head = Head(self.config.norm)
         self._remembered: _Remembered | None = None
 

@@ -3,7 +3,8 @@
 The layers are those of the paper; the order of operations is chosen for a CPU. A linear layer
 commutes with gathering, so it is applied to the points before they are gathered; channels lie
 last, so that layers are plain matrix products; the two small networks on offsets and densities
-have so few channels that theirs lie first instead, over one long row axis.
+have so few channels that theirs lie first instead, over one long row axis. What stands here step
+by step runs in a few passes where `dnet.nets.fused` takes it.
 """
 
 from itertools import pairwise
@@ -13,6 +14,9 @@ import torch
 from jaxtyping import Float, Integer
 from torch import Tensor, nn
 from torch.nn import functional
+
+from dnet.nets.fused import Layers, fused_level
+from dnet.nets.kernels.norm import EPSILON
 
 Norm = Literal["group", "batch"]
 """`group`: over all channels of one cloud; `batch`: each channel over all clouds of a batch."""
@@ -25,7 +29,7 @@ class GroupNorm(nn.Module):
         super().__init__()
         self.weight = nn.Parameter(torch.ones(channels))
         self.bias = nn.Parameter(torch.zeros(channels))
-        self.epsilon = 1e-5
+        self.epsilon = EPSILON
 
     def forward(self, x: Float[Tensor, "b *rows c"]) -> Float[Tensor, "b *rows c"]:
         """Normalise with channels last."""
@@ -114,16 +118,19 @@ class SetAbstraction(nn.Module):
         features: Channels of a point that comes in, its coordinates aside.
         channels: Channels of a centroid that goes out.
         norm: Normalisation of every layer.
+        density: Whether to weigh by how crowded the points are, too.
     """
 
     weights_per_channel = 16
+    weight_widths = (3, 8, 8, weights_per_channel)
+    density_widths = (1, 16, 8, 1)
 
-    def __init__(self, features: int, channels: int, norm: Norm) -> None:
+    def __init__(self, features: int, channels: int, norm: Norm, *, density: bool = True) -> None:
         super().__init__()
         self.point_linear = nn.Linear(3 + features, channels)
         self.point_norm = make_norm(norm, channels)
-        self.weight_net = pointwise_net((3, 8, 8, self.weights_per_channel), norm)
-        self.density_net = pointwise_net((1, 16, 8, 1), norm)
+        self.weight_net = pointwise_net(self.weight_widths, norm)
+        self.density_net = pointwise_net(self.density_widths, norm) if density else None
         self.output_linear = nn.Linear(self.weights_per_channel * channels, channels)
         self.output_norm = make_norm(norm, channels)
 
@@ -146,6 +153,17 @@ class SetAbstraction(nn.Module):
                 centroid.
             inverse_density: One over the density at each point.
         """
+        if isinstance(self.point_norm, GroupNorm) and self.density_net is not None:
+            fused = fused_level(
+                points,
+                features,
+                centroids=centroids,
+                neighbours=neighbours,
+                inverse_density=inverse_density,
+                layers=self._layers(),
+            )
+            if fused is not None:
+                return fused
         linear = self.point_linear
         hidden = functional.linear(
             torch.cat([points, features], dim=-1), linear.weight, linear.bias
@@ -162,6 +180,24 @@ class SetAbstraction(nn.Module):
         hidden = functional.relu_(self.point_norm(hidden))
         return self._convolve(hidden, offsets, scale=scale / scale.amax(dim=2, keepdim=True))
 
+    def _layers(self) -> Layers:
+        """Return the parameters as a fused level takes them."""
+        point, output = self.point_linear, self.output_linear
+        small: list[nn.Linear | GroupNorm | BatchNorm] = [self.point_norm]
+        for layer in (*self.weight_net, *self.density_net):
+            if isinstance(layer, PointwiseLayer):  # as all are
+                small += [layer.linear, layer.norm]
+        small.append(self.output_norm)
+        return Layers(
+            point.weight,
+            point.bias,
+            output.weight,
+            output.bias,
+            tuple(x for one in small for x in (one.weight, one.bias)),
+            self.weight_widths,
+            self.density_widths,
+        )
+
     def _convolve(
         self,
         hidden: Float[Tensor, "b s k c"],
@@ -172,7 +208,8 @@ class SetAbstraction(nn.Module):
         """Weigh each neighbour's features by where it lies and how crowded, and sum."""
         batch, groups, size, channels = hidden.shape
         weights = self.weight_net(offsets.permute(3, 0, 1, 2).reshape(3, batch, -1))
-        weights = weights * self.density_net(scale.reshape(1, batch, -1))
+        if self.density_net is not None:
+            weights = weights * self.density_net(scale.reshape(1, batch, -1))
         weights = weights.view(-1, batch * groups, size).permute(1, 2, 0)
         hidden = hidden.view(batch * groups, size, channels).transpose(1, 2)
         summed = torch.bmm(hidden, weights).view(batch, groups, -1)

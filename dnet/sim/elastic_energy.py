@@ -13,7 +13,7 @@ from typing import NamedTuple, no_type_check
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 from dnet.sim.material import Lame
 from dnet.sim.tetrahedra import TetrahedralMesh
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.sparse import csr_array
 
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 
 
 class Envelope(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple, no_type_check
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from dnet.sim.compiled import compiled
+from dnet.compiled import compiled
 from dnet.sim.elastic_energy import Components, Elements, energy_and_gradient
 from dnet.sim.envelope import Envelope, solve
 

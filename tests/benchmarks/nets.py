@@ -19,13 +19,13 @@ from typing import Literal
 import numpy as np
 import torch
 import tyro
-from dnet.nets.fused import step_by_step
 from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig, prepare
+from dnet.nets.fused import step_by_step
 from dnet.nets.neighbourhoods import Size, stack
 from dnet.training.allocation import keep_pages
 from dnet.training.loop import new_network

@@ -1,0 +1,1 @@
+"""What the networks compute most, compiled for the processor at hand."""
