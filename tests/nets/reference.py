@@ -64,7 +64,8 @@ def abstract(
     scale = (scale / scale.max(-1, keepdim=True).values)[..., None]
     hidden = torch.cat([offsets, pick(features, rows)], -1)
     hidden = layer(hidden, level.point_linear, level.point_norm)
-    hidden = hidden * small_net(scale, level.density_net)
+    if level.density_net is not None:
+        hidden = hidden * small_net(scale, level.density_net)
     weights = small_net(offsets, level.weight_net)
     summed = torch.einsum("bskc,bskw->bscw", hidden, weights).flatten(2)
     return centroids, layer(summed, level.output_linear, level.output_norm)

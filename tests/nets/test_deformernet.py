@@ -103,6 +103,18 @@ def test_the_network_is_the_one_of_the_equations(
     torch.testing.assert_close(rounded, exact, rtol=1e-4, atol=1e-4 * exact.max().item())
 
 
+def test_without_density_crowded_points_count_like_all_others() -> None:
+    torch.manual_seed(0)
+    model = DeformerNet(DeformerNetConfig(points=192, density=False)).double()
+    assert not any("density" in name for name in model.state_dict())
+    seen = batch(clouds(3), model)
+    here = replace(seen, points=seen.points.double())
+    got = model.encode(here)
+    torch.testing.assert_close(got, reference.encode(model, here.points), rtol=1e-8, atol=1e-8)
+    crowded = replace(here, inverse_densities=tuple(2 * x for x in seen.inverse_densities))
+    assert torch.equal(model.encode(crowded), got)
+
+
 def test_running_figures_are_kept_as_batch_normalisation_defines_them() -> None:
     model = network(norm="batch")
     seen, turned = batch(clouds(4), model), batch(clouds(4)[::-1], model)
