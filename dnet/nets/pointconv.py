@@ -160,7 +160,7 @@ class SetAbstraction(nn.Module):
                 centroids=centroids,
                 neighbours=neighbours,
                 inverse_density=inverse_density,
-                layers=self._layers(),
+                layers=self._layers(self.density_net),
             )
             if fused is not None:
                 return fused
@@ -180,11 +180,11 @@ class SetAbstraction(nn.Module):
         hidden = functional.relu_(self.point_norm(hidden))
         return self._convolve(hidden, offsets, scale=scale / scale.amax(dim=2, keepdim=True))
 
-    def _layers(self) -> Layers:
+    def _layers(self, density_net: nn.Sequential) -> Layers:
         """Return the parameters as a fused level takes them."""
         point, output = self.point_linear, self.output_linear
         small: list[nn.Linear | GroupNorm | BatchNorm] = [self.point_norm]
-        for layer in (*self.weight_net, *self.density_net):
+        for layer in (*self.weight_net, *density_net):
             if isinstance(layer, PointwiseLayer):  # as all are
                 small += [layer.linear, layer.norm]
         small.append(self.output_norm)

@@ -111,7 +111,8 @@ def test_without_density_crowded_points_count_like_all_others() -> None:
     here = replace(seen, points=seen.points.double())
     got = model.encode(here)
     torch.testing.assert_close(got, reference.encode(model, here.points), rtol=1e-8, atol=1e-8)
-    crowded = replace(here, inverse_densities=tuple(2 * x for x in seen.inverse_densities))
+    below, middle, above = (2 * x for x in seen.inverse_densities)
+    crowded = replace(here, inverse_densities=(below, middle, above))
     assert torch.equal(model.encode(crowded), got)
 
 
