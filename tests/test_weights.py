@@ -1,0 +1,53 @@
+"""The network that ships: whole, small, with a card, and good on what it has never seen."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import dnet
+from dnet.commands.evaluate import Evaluate, Network
+from dnet.commands.record import Record
+from dnet.errors import BadCheckpoint
+from dnet.training.checkpoints import read_metrics
+from dnet.weights import DEFORMERNET
+
+CARD = DEFORMERNET.with_name("MODEL_CARD.md")
+
+
+def test_it_is_small_enough_to_ship_and_loads_without_a_path() -> None:
+    assert DEFORMERNET.stat().st_size < 8_000_000
+    network = dnet.load()
+    assert network.config.points == 2048
+    assert not network.training
+
+
+def test_its_card_tells_the_same_epoch_as_its_file() -> None:
+    text = CARD.read_text(encoding="utf-8")
+    metrics = read_metrics(DEFORMERNET)
+    assert f"**Best epoch**: {metrics['epoch']} of " in text
+    rows = [line for line in text.splitlines() if line.startswith("| unseen")]
+    assert len(rows) == 4
+    # Judged on all frames; the file tells the errors on some of them.
+    told = float(rows[2].split("|")[4])
+    found = metrics["unseen_episodes"]["any_pair"]["mse_mm2"]
+    assert re.match(r"\| unseen episodes \| any two", rows[2])
+    assert told == pytest.approx(found, rel=0.2)
+
+
+def test_it_predicts_the_motions_of_an_episode_that_it_has_never_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of the other world, too: its shapes are those of the same energy."""
+    Record(tmp_path / "data", pairs=1, shapes=8, seed=977, world="quasistatic").run()
+    capsys.readouterr()
+    Evaluate(Network(tmp_path / "data", json=True)).run()
+    errors = json.loads(capsys.readouterr().out)["any_pair"]
+    assert errors["pairs"] == 72
+    assert errors["mse_mm2"] < errors["zero_mse_mm2"] / 30
+
+
+def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadCheckpoint, match="does not exist; give a run directory"):
+        dnet.load(tmp_path / "none")
