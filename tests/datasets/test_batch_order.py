@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dnet.datasets.batch_order import BatchOrder
@@ -24,6 +24,7 @@ def test_everything_comes_to_one_process_once_an_epoch(
 
 
 @given(count=st.integers(1, 200), batch=st.integers(1, 17), world=worlds)
+@settings(deadline=None)  # of many batches, on a busy machine
 def test_processes_together_see_the_batches_that_one_would_see(
     count: int, batch: int, world: int
 ) -> None:
