@@ -48,7 +48,8 @@ class Train:
     """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
-    none. Everything else must be as it was."""
+    none. All options must be as they were, but for --epochs and --minutes: with more of them a
+    training goes on longer, its learning rate that of the new schedule."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""

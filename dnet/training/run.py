@@ -23,6 +23,10 @@ LAST, CONFIG, METRICS, STATE, ERRORS = (
 )
 
 
+EXTENSIBLE = ("epochs", "minutes")
+"""What a training may go on with otherwise than it began: the schedule follows the new end."""
+
+
 class RunWriter:
     """Writes a training down as it goes.
 
@@ -103,7 +107,7 @@ class RunWriter:
         before = read_config(self.path)
         for part in ("network", "training", "data"):
             for name, value in self.content[part].items():
-                if before.get(part, {}).get(name) != value:
+                if name not in EXTENSIBLE and before.get(part, {}).get(name) != value:
                     raise OtherRun(self.path, name, before.get(part, {}).get(name), value)
         facts, tensors = read_tensors(self.path / STATE)
         lines = (self.path / METRICS).read_text(encoding="utf-8") if facts["epochs"] else ""

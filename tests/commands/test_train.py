@@ -170,8 +170,17 @@ def test_a_finished_training_has_nothing_to_go_on_with(
 
 
 def test_other_settings_are_not_gone_on_with(run: Path, episodes: Path) -> None:
-    with pytest.raises(OtherRun, match="has epochs 3, not 4"):
-        Train(from_mcap=episodes, out=run, epochs=4, device="cpu", resume=True).run()
+    with pytest.raises(OtherRun, match="has frames 8, not 4"):
+        Train(from_mcap=episodes, out=run, epochs=3, device="cpu", frames=4, resume=True).run()
+
+
+def test_a_finished_training_goes_on_for_more_epochs(episodes: Path, tmp_path: Path) -> None:
+    for epochs in (2, 4):
+        Train(from_mcap=episodes, out=tmp_path, epochs=epochs, device="cpu", resume=True).run()
+    assert [line["epoch"] for line in untimed(tmp_path)] == [1, 2, 3, 4]
+    rates = [line["learning_rate"] for line in untimed(tmp_path)]
+    assert rates[2] > rates[1]
+    assert read_config(tmp_path)["training"]["epochs"] == 4
 
 
 def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError], str]]:
