@@ -5,6 +5,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,7 +128,7 @@ def begun(episodes: Path, out: Path) -> subprocess.Popen[str]:
     return process
 
 
-def untimed(run: Path) -> list[dict[str, object]]:
+def untimed(run: Path) -> list[dict[str, Any]]:
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     return [{k: v for k, v in one.items() if k not in ("seconds", "waited")} for one in lines]
 
