@@ -132,10 +132,10 @@ def _measure(formulation: Formulation, size: Size, clock: Callable[[], float]) -
         features = encode(2)
         model.motion(features[:1], features[1:])
 
+    before = _peak()
     one = _best(alone, clock)
     predicted = _best(lambda: predict(model), clock)
     forwards = _best(forward, clock)
-    before = _peak()
     both = _best(lambda: learn(pairs), clock)
     memory = _peak() - before
     every = _best(lambda: learn(every_pair), clock)
