@@ -11,6 +11,10 @@ from dnet.commands.servo import Servo
 from dnet.commands.train import Train
 
 
+EPOCHS = 1000
+"""More than there is time for: the schedule follows the clock."""
+
+
 @dataclass(frozen=True)
 class Demo:
     """Record, train, servo and play on a small scale, and show the command behind each step.
@@ -57,9 +61,9 @@ class Demo:
         steps.run("list", f"dnet inspect ls {data}", Inspect(List(data)))
         steps.run(
             "train",
-            f"dnet train --from-mcap {data} --out {train} --minutes {self.minutes} "
-            f"--seed {self.seed}",
-            Train(data, train, minutes=self.minutes, seed=self.seed),
+            f"dnet train --from-mcap {data} --out {train} --epochs {EPOCHS} "
+            f"--minutes {self.minutes} --seed {self.seed}",
+            Train(data, train, epochs=EPOCHS, minutes=self.minutes, seed=self.seed),
         )
         goal, frame = held_out_goal(data, train)
         steps.run(
