@@ -10,7 +10,6 @@ from dnet.commands.record import Record
 from dnet.commands.servo import Servo
 from dnet.commands.train import Train
 
-
 EPOCHS = 1000
 """More than there is time for: the schedule follows the clock."""
 
