@@ -10,7 +10,7 @@ from dnet.datasets.groups import GroupBatch, Groups
 from dnet.datasets.index import open_index
 from dnet.datasets.pairs import Pairs, any_two, from_rest, mixed
 from dnet.datasets.samples import SampleBatch, Samples
-from dnet.datasets.split import split, split_frames
+from dnet.datasets.split import HELD_OUT, split, split_frames
 from dnet.datasets.stream import Stream
 from dnet.types import Place
 
@@ -27,7 +27,7 @@ class Division:
     by: Literal["episode", "shape"] = "episode"
     """`episode`: a network is judged by unseen objects and grasps, as `dnet train` does; `shape`:
     by unseen shapes of seen episodes, as the paper does."""
-    fraction: float = 0.25
+    fraction: float = HELD_OUT
     """How much is for validation."""
     seed: int = 0
 

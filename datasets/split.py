@@ -8,6 +8,9 @@ import numpy as np
 from dnet.datasets.frame_table import FrameTable
 from dnet.errors import NotAFraction
 
+HELD_OUT = 0.15
+"""Share to validate on where none is stated; the commands that part a dataset state the same."""
+
 
 def split(
     episode_ids: Sequence[str], *, fraction: float, seed: int = 0

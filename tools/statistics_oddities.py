@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import polars as pl
 
 from dnet.datasets.index import Index
-from dnet.datasets.split import split
+from dnet.datasets.split import HELD_OUT, split
 
 FENCE = 3.0
 """Interquartile ranges beyond the quartiles from which on a value is far out (Tukey 1977)."""
@@ -46,7 +46,7 @@ class Oddities:
     """The fraction by which the episodes were parted, as `dnet train` parts them."""
 
 
-def oddities(index: Index, *, validation: float = 0.25, seed: int = 0) -> Oddities:
+def oddities(index: Index, *, validation: float = HELD_OUT, seed: int = 0) -> Oddities:
     """Return what is odd in the finished episodes of a dataset.
 
     Args:

@@ -5,7 +5,10 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from dnet.commands.inspect_split import Split
+from dnet.commands.train import Train
 from dnet.datasets.index import open_index
+from dnet.datasets.split import HELD_OUT
 from dnet.errors import (
     BadEpisode,
     ClashingEpisodes,
@@ -157,3 +160,8 @@ def test_a_merge_of_nothing_readable_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NoEpisodes, match=r"holds no \.mcap episode that can be read"):
         merge_datasets([index], tmp_path / "both", skip_broken=True)
     assert not (tmp_path / "both").exists()
+
+
+def test_whoever_states_no_share_holds_out_the_same() -> None:
+    assert Train(Path("data"), Path("out")).validation == HELD_OUT
+    assert Split(Path("data"), Path("out")).validation == HELD_OUT
