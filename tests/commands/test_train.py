@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -116,11 +117,17 @@ def test_time_limits_a_training_whatever_its_epochs(episodes: Path, tmp_path: Pa
 
 
 def begun(episodes: Path, out: Path) -> subprocess.Popen[str]:
-    """Start a training and wait until it has learned for some epochs."""
+    """Start a training and wait until it has learned for some epochs.
+
+    On one thread, like the trainings of this process: sums on two end in other bits.
+    """
     code = "import sys; from dnet.cli import main; sys.exit(main())"
     words = ["train", "--from-mcap", str(episodes), "--out", str(out), "--epochs", "60"]
     process = subprocess.Popen(
-        [sys.executable, "-c", code, *words, "--device", "cpu"], stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", code, *words, "--device", "cpu"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
     )
     while not (out / "metrics.jsonl").exists():
         assert process.poll() is None, process.stderr and process.stderr.read()

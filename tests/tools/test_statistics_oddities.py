@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from dnet.datasets.index import open_index
+from dnet.datasets.split import HELD_OUT
 from dnet.tools.statistics_oddities import Oddities, oddities
 from tests.recorders.rollout import frame, frames, write
 
@@ -25,7 +26,7 @@ def test_nothing_is_odd_in_a_dataset_of_random_shapes(tmp_path: Path) -> None:
         ]
         write(tmp_path / f"{number}.mcap", seen)
     found = odd(tmp_path)
-    assert found == Oddities((), (), 0, (), 0, 0.25)
+    assert found == Oddities((), (), 0, (), 0, HELD_OUT)
 
 
 def test_a_value_that_never_varies_is_named(tmp_path: Path) -> None:
