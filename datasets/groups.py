@@ -1,6 +1,7 @@
 """Groups for training on all pairs: some clouds of one episode, each to be encoded once."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from dnet.datasets.batch_order import Drawn
 from dnet.datasets.clouds import Clouds
 from dnet.datasets.pairs import Rows
 from dnet.datasets.permutation import Permutation
-from dnet.errors import TooFew
+from dnet.errors import NotAFraction, TooFew
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +108,21 @@ class Groups(Dataset[GroupBatch]):
         clouds: Of the frames of a table.
         size: The least clouds of a group, except in an episode with fewer; at least two.
         seed: Of who meets whom.
+        rest_share: How many groups the rest shape of their episode joins, if it is not dealt to
+            them, from 0 to 1. It is one frame of very many, and where every servo run begins.
+
+    Raises:
+        TooFew: If groups are to have fewer than two frames, or there is none.
+        NotAFraction: If `rest_share` is not between 0 and 1.
     """
 
-    def __init__(self, clouds: Clouds, *, size: int = 5, seed: int = 0) -> None:
+    def __init__(
+        self, clouds: Clouds, *, size: int = 5, seed: int = 0, rest_share: float = 0.0
+    ) -> None:
+        if not 0 <= rest_share <= 1:
+            raise NotAFraction("share of the groups that the rest shape joins", rest_share)
         self.clouds = clouds
+        self.rest_share = rest_share
         self.dealt = Dealt(tuple(clouds.table.lengths.tolist()), size, seed)
 
     def __len__(self) -> int:
@@ -118,7 +130,7 @@ class Groups(Dataset[GroupBatch]):
 
     def choose(self, drawn: Drawn) -> Chosen:
         """Return which frames a batch of groups has, and its pairs."""
-        groups = [self.dealt.rows(number, epoch=drawn.epoch) for number in drawn.numbers.tolist()]
+        groups = [self._rows(number, epoch=drawn.epoch) for number in drawn.numbers.tolist()]
         sizes = np.array([len(group) for group in groups])
         rows, numbers = np.concatenate(groups), np.repeat(np.arange(len(groups)), sizes)
         # All pairs of the batch, those within one group.
@@ -136,4 +148,23 @@ class Groups(Dataset[GroupBatch]):
     @property
     def fingerprint(self) -> str:
         """What changes when one of the files does, or other frames are taken."""
-        return f"{self.clouds.table.fingerprint}-{self.dealt.size}-{self.dealt.seed}"
+        dealt = f"{self.dealt.size}-{self.dealt.seed}-{self.rest_share:g}"
+        return f"{self.clouds.table.fingerprint}-{dealt}"
+
+    def _rows(self, number: int, *, epoch: int) -> Rows:
+        """Return the frames of a group, with the rest shape in front if it joins."""
+        rows = self.dealt.rows(number, epoch=epoch)
+        chance = np.random.default_rng((self.dealt.seed, epoch, number)).random()
+        rest = self._rests[self.clouds.table.file[rows[0]]]
+        if chance >= self.rest_share or rest < 0 or rest in rows:
+            return rows
+        return np.concatenate([[rest], rows])
+
+    @cached_property
+    def _rests(self) -> Rows:
+        """The row of the rest shape of each file, -1 if it has none."""
+        table = self.clouds.table
+        rests = np.flatnonzero(table.rest)
+        found = np.full(len(table.names), -1)
+        found[table.file[rests][::-1]] = rests[::-1]
+        return found

@@ -50,6 +50,9 @@ class Train:
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
+    weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped")] = None
+    """Begin with the weights of this network instead of random ones: a run, a .safetensors file,
+    or the network that ships. Options of the network must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""
@@ -78,6 +81,9 @@ class Train:
     """Groups in a batch, over all processes, each of another episode as a rule."""
     frames: int = 8
     """Clouds in a group; 2 groups of 8 are 16 encodings and 112 pairs."""
+    rest_share: float = 0.25
+    """Share of the groups that the rest shape joins: it is one frame of very many, and where
+    every servo run begins."""
     augment: bool = True
     """Turn and shift each group of frames about the table at random."""
     validation: float = 0.15
@@ -186,6 +192,7 @@ class Train:
             pairs=self.pairs,
             groups=self.groups,
             frames=self.frames,
+            rest_share=self.rest_share,
             augmentation=Augmentation() if self.augment else None,
             precision=auto if self.precision == "auto" else self.precision,
         )
@@ -211,9 +218,10 @@ class Train:
             "unseen_shapes": division.unseen_shapes,
             "unseen_episodes": division.unseen_episodes,
         }
+        begun = {"minutes": self.minutes, "weights": self._digest()}
         return {
             "network": asdict(config),
-            "training": asdict(settings) | {"minutes": self.minutes},
+            "training": asdict(settings) | begun,
             "data": {
                 "directory": str(self.from_mcap),
                 "validation": self.validation,
@@ -227,6 +235,20 @@ class Train:
             "versions": {name: version(name) for name in ("deformernet", "torch")},
         }
 
+    def _begun_with(self, weights: str) -> Path:
+        from dnet.training.checkpoints import weights_file
+        from dnet.weights import DEFORMERNET
+
+        return DEFORMERNET if weights == "shipped" else weights_file(Path(weights))
+
+    def _digest(self) -> str | None:
+        """Return what tells the weights to begin with from others; None for random ones."""
+        import hashlib
+
+        if self.weights is None:
+            return None
+        return hashlib.sha256(self._begun_with(self.weights).read_bytes()).hexdigest()[:16]
+
     def _begin(
         self,
         frames: "Frames",
@@ -237,6 +259,7 @@ class Train:
         process: "Process",
     ) -> "Training":
         from dnet.training.examples import stream_of
+        from dnet.training.checkpoints import begin_with
         from dnet.training.loop import new_network
         from dnet.training.training import Training
 
@@ -247,7 +270,10 @@ class Train:
             workers=self.workers,
             pin=device.type == "cuda",
         )
-        model = new_network(config, seed=self.seed).to(device)
+        model = new_network(config, seed=self.seed)
+        if self.weights is not None:
+            begin_with(model, self._begun_with(self.weights))
+        model = model.to(device)
         seconds = math.inf if self.minutes is None else 60 * self.minutes
         return Training(model, stream, settings, process=process, seconds=seconds)
 

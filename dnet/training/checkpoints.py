@@ -79,7 +79,7 @@ def load(path: Path) -> DeformerNet:
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
     """
-    file = _weights_file(path)
+    file = weights_file(path)
     header, weights = _read(file)
     if header.get("network") != _NETWORK:
         found = header.get("network", "an unnamed network")
@@ -90,13 +90,31 @@ def load(path: Path) -> DeformerNet:
     return model.eval()
 
 
+def begin_with(model: DeformerNet, path: Path) -> None:
+    """Give `model` the weights that `path` holds.
+
+    Args:
+        model: An untrained network.
+        path: A run directory, whose best network is taken, or a `.safetensors` file.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+    """
+    held = load(path)
+    for name, value in asdict(model.config).items():
+        if (other := getattr(held.config, name)) != value:
+            why = f"is of a network with {name} {other}, not {value}"
+            raise BadCheckpoint(path, why, "give the options that it was trained with")
+    model.load_state_dict(held.state_dict())
+
+
 def read_metrics(path: Path) -> dict[str, Any]:
     """Return what was written as `metrics` when `path` was saved.
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt.
     """
-    header, _ = _read(_weights_file(path))
+    header, _ = _read(weights_file(path))
     metrics = header.get("metrics")
     return metrics if isinstance(metrics, dict) else {}
 
@@ -112,7 +130,12 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _weights_file(path: Path) -> Path:
+def weights_file(path: Path) -> Path:
+    """Return the file of a network: `path` itself, or the best one of a run directory.
+
+    Raises:
+        BadCheckpoint: If there is no such file.
+    """
     file = path / BEST if path.is_dir() else path
     if not file.is_file():
         raise BadCheckpoint(file, "does not exist", _HINT)

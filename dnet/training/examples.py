@@ -72,7 +72,9 @@ def stream_of(
     variation = Variation(settings.augmentation, settings.seed)
     drawable: AllPairs | SinglePairs
     if settings.pairs == "all":
-        drawable = AllPairs(frames, size=settings.frames, variation=variation)
+        drawable = AllPairs(
+            frames, size=settings.frames, variation=variation, rest_share=settings.rest_share
+        )
     else:
         of = any_two if settings.pairs == "any" else from_rest
         drawable = SinglePairs(frames, of(frames.table), variation=variation)
@@ -128,11 +130,14 @@ class AllPairs(Dataset[Examples]):
         frames: To learn from.
         size: The least clouds of a group, except in an episode with fewer; at least two.
         variation: How they vary.
+        rest_share: How many groups the rest shape of their episode joins.
     """
 
-    def __init__(self, frames: Frames, *, size: int, variation: Variation) -> None:
+    def __init__(
+        self, frames: Frames, *, size: int, variation: Variation, rest_share: float = 0.0
+    ) -> None:
         self._frames, self._variation = frames, variation
-        self._groups = Groups(frames.clouds, size=size, seed=variation.seed)
+        self._groups = Groups(frames.clouds, size=size, seed=variation.seed, rest_share=rest_share)
 
     def __len__(self) -> int:
         return len(self._groups)

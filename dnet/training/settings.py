@@ -38,6 +38,9 @@ class TrainingSettings:
     frames: int = 8
     """Frames in a group, all pairs of which are trained on. Of single pairs, a batch has so many
     that it encodes as many clouds."""
+    rest_share: float = 0.25
+    """Share of the groups that the rest shape joins: it is one frame of very many, and where
+    every servo run begins."""
     augmentation: Augmentation | None = field(default_factory=Augmentation)
     """How groups are placed anew at every turn; None leaves them where they are."""
     gradient_limit: float = 1.0

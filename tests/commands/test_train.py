@@ -15,6 +15,7 @@ import torch
 from dnet.commands.train import Train
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import (
+    BadCheckpoint,
     BadEpisode,
     DnetError,
     MissingPath,
@@ -191,6 +192,18 @@ def test_a_finished_training_goes_on_for_more_epochs(episodes: Path, tmp_path: P
     assert read_config(tmp_path)["training"]["epochs"] == 8
 
 
+def test_a_training_may_begin_with_the_weights_of_another(
+    run: Path, episodes: Path, tmp_path: Path
+) -> None:
+    tune = Train(from_mcap=episodes, out=tmp_path / "tuned", weights=str(run), device="cpu")
+    replace(tune, epochs=1, learning_rate=1e-9).run()
+    assert read_config(tmp_path / "tuned")["training"]["weights"]
+    for name, weights in load(run).state_dict().items():
+        torch.testing.assert_close(load(tmp_path / "tuned").state_dict()[name], weights)
+    with pytest.raises(OtherRun, match="has weights"):
+        replace(tune, epochs=2, learning_rate=1e-9, weights=None, resume=True).run()
+
+
 def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError], str]]:
     good = Train(from_mcap=episodes, out=tmp_path / "run")
     empty = tmp_path / "empty"
@@ -209,6 +222,8 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, seed=-1), TooFew, "--seed is -1, must be at least 0"),
         (replace(good, minutes=0.0), TooShort, "--minutes is 0.0, must be above 0"),
         (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),
+        (replace(good, weights="nowhere"), BadCheckpoint, "nowhere does not exist"),
+        (replace(good, weights="shipped"), BadCheckpoint, "with points 2048, not 136"),
         (replace(good, size="paper"), TooFew, "136, must be at least 512"),
     ]
 

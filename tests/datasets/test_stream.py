@@ -12,7 +12,7 @@ from dnet.datasets.groups import Dealt, Groups
 from dnet.datasets.pairs import any_two, from_rest, mixed
 from dnet.datasets.samples import SampleBatch, Samples
 from dnet.datasets.stream import Stream
-from dnet.errors import OtherStream, TooFew
+from dnet.errors import NotAFraction, OtherStream, TooFew
 from tests.datasets.dataset import LENGTHS, table_of, write_dataset
 
 PAIRS = sum(length * (length - 1) for length in LENGTHS)
@@ -138,3 +138,25 @@ def test_groups_are_of_two_or_more() -> None:
         Dealt((3,), 1)
     with pytest.raises(TooFew, match="two settled frames is 0"):
         Dealt((1, 1), 2)
+
+
+def test_the_rest_shape_joins_a_share_of_the_groups(folder: Path) -> None:
+    clouds = Clouds(table_of(folder))
+    rest = clouds.table.rest
+
+    def joined(share: float) -> list[list[bool]]:
+        groups = Groups(clouds, size=2, rest_share=share)
+        return [
+            rest[batch.rows.numpy()].tolist()
+            for epoch in range(40)
+            for batch in Stream(groups, BatchOrder(len(groups), 1, seed=epoch))
+        ]
+
+    every, some, none = (joined(share) for share in (1.0, 0.5, 0.0))
+    assert all(sum(group) == 1 for group in every)
+    share = [sum(any(group) for group in groups) / len(groups) for groups in (some, none)]
+    # It is dealt to some groups anyway, and joins half of the others.
+    assert share[0] == pytest.approx(share[1] + (1 - share[1]) / 2, abs=0.1)
+    assert joined(0.5) == some
+    with pytest.raises(NotAFraction, match="rest shape joins is 1.5, must be from 0 to 1"):
+        Groups(clouds, rest_share=1.5)

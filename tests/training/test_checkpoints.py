@@ -2,6 +2,7 @@ import json
 import os
 import pickle
 import stat
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
-from dnet.training.checkpoints import load, read_metrics, save, write_json
+from dnet.training.checkpoints import begin_with, load, read_metrics, save, write_json
 from dnet.training.loop import new_network
 from tests.training.deforming_box import SMALL, BoxEpisode
 
@@ -211,3 +212,15 @@ def test_json_that_was_written_reads_back(tmp_path: Path, content: dict[str, Any
     write_json(tmp_path / "a" / "config.json", content)
     assert json.loads((tmp_path / "a" / "config.json").read_text(encoding="utf-8")) == content
     assert len(list((tmp_path / "a").iterdir())) == 1
+
+
+def test_a_training_begins_with_the_weights_of_a_network_like_it(
+    model: DeformerNet, saved: Path
+) -> None:
+    other = new_network(SMALL, seed=1)
+    begin_with(other, saved.parent)
+    for name, weights in other.state_dict().items():
+        assert torch.equal(weights, model.state_dict()[name])
+    unlike = new_network(replace(SMALL, norm="batch"), seed=1)
+    with pytest.raises(BadCheckpoint, match="with norm group, not batch; give the options"):
+        begin_with(unlike, saved)

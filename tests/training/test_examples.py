@@ -13,7 +13,7 @@ from dnet.training.parallel import Process
 from dnet.training.settings import PairKind, TrainingSettings
 from tests.training.deforming_box import box_frames
 
-SETTINGS = TrainingSettings(groups=2, frames=3)
+SETTINGS = TrainingSettings(groups=2, frames=3, rest_share=0.0)
 PLAIN = replace(SETTINGS, augmentation=None)
 ALONE = Process()
 
