@@ -57,6 +57,11 @@ class FrameTable:
         return np.bincount(self.file, minlength=len(self.names)).astype(np.int64)
 
     @property
+    def episodes_seen(self) -> list[str]:
+        """The ids of the episodes that the frames are of, sorted."""
+        return sorted({self.episodes[file] for file in np.unique(self.file).tolist()})
+
+    @property
     def fingerprint(self) -> str:
         """What changes when one of the files does, or other frames of them are taken."""
         digest = hashlib.sha256("\n".join(self.digests).encode())

@@ -31,7 +31,7 @@ class Curves:
     def send_losses(self, losses: Sequence[LossPoint]) -> None:
         """Send the curve of the losses of batches, as they are and as logarithms."""
         steps = [point.step for point in losses]
-        values = [point.loss_mm2 for point in losses]
+        values = [point.loss for point in losses]
         style: list[rr.AsComponents] = [
             rr.SeriesLines(names="batches", colors=LOSS_COLOR, widths=1)
         ]

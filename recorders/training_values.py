@@ -15,7 +15,7 @@ class LossPoint:
 
     step: int
     """Batches since the training began."""
-    loss_mm2: float
+    loss: float
     """Squared error of the batch, or its mean over some batches up to this one, in square
     millimetres: the mean over pairs and over x, y, z, as `SetErrors.mse_mm2`."""
 

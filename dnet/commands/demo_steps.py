@@ -12,7 +12,7 @@ from rich.table import Table
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import OccupiedOutput
 from dnet.tools.listing import list_episodes
-from dnet.training.run import METRICS, read_config
+from dnet.training.run import METRICS, best_of, main_scores, read_config
 
 STATE = "demo.json"
 
@@ -70,8 +70,7 @@ def summary(out: Path, seconds: dict[str, float]) -> Table:
     """Return the closing table of the demo in `out`."""
     shapes = int(list_episodes(out / "data")["shapes"].sum())
     epochs = [json.loads(line) for line in (out / "train" / METRICS).read_text().splitlines()]
-    scores = [epoch["unseen_episodes"]["any_pair"] for epoch in epochs]
-    best = min(scores, key=lambda score: float(score["mse_mm2"]))
+    best = main_scores((best_of(epochs) or epochs[-1])["unseen_episodes"])
     with EpisodeReader(out / "servo" / "run.mcap") as episode:
         result, goal = episode.result or {}, episode.meta.settings["goal"]
     chamfer = [1e3 * distance for distance in result["chamfer"]]

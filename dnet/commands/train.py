@@ -26,11 +26,12 @@ WATCHED = 2000
 
 @dataclass(frozen=True)
 class Train:
-    """Train DeformerNet on episodes and keep the network that judges unseen ones best.
+    """Train a network on episodes and keep the one that judges unseen episodes best.
 
-    Every settled frame of an episode is paired with every other: the network sees both clouds
-    and learns the motion of the grasp between them. Some episodes are held out, and some shapes
-    of the others, to judge it by. Clouds are read from the logs as they are needed.
+    DeformerNet sees two settled frames of an episode and learns the motion of the grasp between
+    them. The networks that choose where to grasp see the rest shape and another one, and learn
+    the manipulation point. Some episodes are held out, and some shapes of the others, to judge
+    by. Clouds are read from the logs as they are needed.
 
     The run directory gets best.safetensors and last.safetensors, each of which is enough for
     `dnet servo`, a model card, metrics.jsonl (a line an epoch), training.rrd (for `dnet play`),
@@ -46,13 +47,17 @@ class Train:
     """Episodes of `dnet record`, two or more; read from where they lie, be it an object store."""
     out: Path
     """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
+    model: Literal["deformernet", "grasp", "dense"] = "deformernet"
+    """`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
+    `dense`: where to grasp, as a score for each point."""
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
     weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped")] = None
     """Begin with the weights of this network instead of random ones: a run, a .safetensors file,
-    or the network that ships. Options of the network must be those that it has."""
+    or the DeformerNet that ships; of another --model, the encoder alone. Options of the network
+    must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""
@@ -127,6 +132,7 @@ class Train:
         from dnet.datasets.stores import as_place
         from dnet.training.division import divide
         from dnet.training.run import RunWriter
+        from dnet.training.tasks import TASKS
 
         if not process.first:
             process.wait()  # for the index and the tables that the first one makes
@@ -139,7 +145,7 @@ class Train:
         frames = _prepared(division, config, console)
         if process.first:
             process.wait()
-        show_data(console, division, frames)
+        show_data(console, division, frames, target=TASKS[self.model].target)
         training = self._begin(frames, config, settings, device=device, process=process)
         resumed = run.take_up(training)
         if resumed:
@@ -149,7 +155,7 @@ class Train:
             finish(training, division, run=run, frames=frames, console=console, out=Console())
 
     def _check(self) -> None:
-        from dnet.errors import TooFew, TooShort
+        from dnet.errors import TooFew, TooShort, UnusedOption
 
         for what, value, least in (
             ("--epochs", self.epochs, 1e-9),
@@ -159,6 +165,8 @@ class Train:
         ):
             if value < least:
                 raise TooFew(what, value, least)
+        if self.model != "deformernet" and self.pairs != "all":
+            raise UnusedOption(f"--pairs {self.pairs}", "--model deformernet")
         if self.minutes is not None and not self.minutes > 0:
             raise TooShort("--minutes", self.minutes)
 
@@ -220,15 +228,13 @@ class Train:
         }
         begun = {"minutes": self.minutes, "weights": self._digest()}
         return {
-            "network": asdict(config),
+            "network": {"model": self.model} | asdict(config),
             "training": asdict(settings) | begun,
             "data": {
                 "directory": str(self.from_mcap),
                 "validation": self.validation,
-                "training": sorted({division.training.episodes[i] for i in division.training.file}),
-                "unseen_episodes": sorted(
-                    {division.unseen_episodes.episodes[i] for i in division.unseen_episodes.file}
-                ),
+                "training": division.training.episodes_seen,
+                "unseen_episodes": division.unseen_episodes.episodes_seen,
                 "frames": {name: len(table) for name, table in parts.items()},
                 "fingerprints": {name: table.fingerprint for name, table in parts.items()},
             },
@@ -258,24 +264,26 @@ class Train:
         device: "torch.device",
         process: "Process",
     ) -> "Training":
-        from dnet.training.examples import stream_of
         from dnet.training.checkpoints import begin_with
-        from dnet.training.loop import new_network
+        from dnet.training.examples import stream_of
+        from dnet.training.tasks import TASKS
         from dnet.training.training import Training
 
+        task = TASKS[self.model]
         stream = stream_of(
             frames,
             settings,
             process=process,
+            target=task.target,
             workers=self.workers,
             pin=device.type == "cuda",
         )
-        model = new_network(config, seed=self.seed)
+        model = task.new(config, seed=self.seed)
         if self.weights is not None:
             begin_with(model, self._begun_with(self.weights))
-        model = model.to(device)
+        objective = task.objective(model.to(device))
         seconds = math.inf if self.minutes is None else 60 * self.minutes
-        return Training(model, stream, settings, process=process, seconds=seconds)
+        return Training(objective, stream, settings, process=process, seconds=seconds)
 
     def _fit(
         self,

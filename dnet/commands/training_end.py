@@ -35,16 +35,18 @@ def finish(
     """
     from dnet.commands.progress import progress
     from dnet.commands.training_screen import error_table
-    from dnet.training.checkpoints import load
+    from dnet.training.checkpoints import load_any
     from dnet.training.division import thinned
     from dnet.training.frames import Frames
     from dnet.training.model_card import write_card
-    from dnet.training.scores import Errors, errors_of
+    from dnet.training.scores import Errors
+    from dnet.training.tasks import task_of
 
     if training.stopped and training.progress < 1:
         console.print(_stopped_line(training, run))
         return
-    network = load(run.path).to(next(training.model.parameters()).device)
+    network = load_any(run.path).to(next(training.model.parameters()).device)
+    task = task_of(network)
     parts = {
         "training": thinned(division.training, JUDGED),
         "unseen shapes": division.unseen_shapes,
@@ -52,15 +54,15 @@ def finish(
     }
     errors: dict[str, Errors | None] = {}
     with progress(console, "clouds") as bar:
-        task = bar.add_task("judging", total=sum(len(table) for table in parts.values()))
+        bar_task = bar.add_task("judging", total=sum(len(table) for table in parts.values()))
         for name, table in parts.items():
             judged = Frames.of(table, frames.config, samplings=frames.tables.samplings)
-            errors[name] = errors_of(
-                network, judged, on_clouds=lambda done: bar.advance(task, done)
+            errors[name] = task.judge(
+                network, judged, on_clouds=lambda done: bar.advance(bar_task, done)
             )
     run.add_errors(errors)
-    write_card(run, errors)
-    out.print(error_table(errors))
+    write_card(run, errors, task)
+    out.print(error_table(errors, zero=task.zero))
     console.print(_closing_line(training, run))
 
 
@@ -80,7 +82,9 @@ def _stopped_line(training: "Training", run: "RunWriter") -> str:
 
 
 def _best_line(run: "RunWriter") -> str:
-    if not run.history:
+    from dnet.training.run import best_of
+
+    best = best_of(run.history)
+    if best is None:
         return ""
-    best = min(run.history, key=lambda line: line["unseen_episodes"]["any_pair"]["mse_mm2"])
     return f"the best was epoch {best['epoch']}; "

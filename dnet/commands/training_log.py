@@ -15,7 +15,7 @@ from dnet.recorders.training_values import (
     SetErrors,
     WorstSample,
 )
-from dnet.training.run import RunWriter
+from dnet.training.run import RunWriter, main_scores
 from dnet.training.showcase import Showcase
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _steps(history: list[dict[str, Any]]) -> list[tuple[int, dict[str, Any]]]:
 
 def _losses(before: int, line: dict[str, Any]) -> list[LossPoint]:
     """Return the curve of an epoch, each point at the end of what it is the mean of."""
-    losses, steps = line["losses_mm2"], line["steps"] - before
+    losses, steps = line["losses"], line["steps"] - before
     return [
         LossPoint(before + steps * (part + 1) // len(losses), loss)
         for part, loss in enumerate(losses)
@@ -87,7 +87,7 @@ def _errors(line: dict[str, Any]) -> dict[str, SetErrors]:
     found = {}
     for name, key in SETS.items():
         if line[key] is not None:
-            scores = line[key]["any_pair"]
+            scores = main_scores(line[key])
             found[name] = SetErrors(scores["mse_mm2"], scores["mean_mm"], scores["r2"])
     return found
 
@@ -103,7 +103,7 @@ def _worst(showcase: Showcase) -> list[WorstSample]:
             caption=pair.title,
             current=pair.current,
             goal=pair.goal,
-            grasp=pair.grasp,
+            grasp=pair.origin,
             true=pair.true,
             predicted=pair.predicted,
             error_mm=pair.error_mm,
@@ -124,7 +124,7 @@ def _open_board(folder: Path, history: list[dict[str, Any]]) -> "SummaryWriter":
 
 def _add_scalars(board: "SummaryWriter", line: dict[str, Any]) -> None:
     step = line["steps"]
-    board.add_scalar("loss/mse_mm2", line["loss_mm2"], step)
+    board.add_scalar("loss", line["loss"], step)
     board.add_scalar("learning_rate", line["learning_rate"], step)
     for name, errors in _errors(line).items():
         board.add_scalar(f"{name}/mse_mm2", errors.mse_mm2, step)

@@ -15,25 +15,31 @@ from rich.progress import (
 from rich.table import Table
 
 from dnet.training.division import Division, pairs_of
-from dnet.training.frames import Frames
+from dnet.training.frames import Frames, Target
 from dnet.training.progress import EpochDone, StepDone
 from dnet.training.scores import Errors, Scores, no_motion
 
 
-def show_data(console: Console, division: Division, training: Frames) -> None:
-    """Print what there is to learn from, and how wrong it is to predict no motion, or the mean."""
-    zero = no_motion(training)
+def show_data(
+    console: Console, division: Division, training: Frames, *, target: Target = "motion"
+) -> None:
+    """Print what there is to learn from, and how wrong it is to always predict the same."""
     table = division.training
-    seen, unseen = (
-        len({part.episodes[file] for file in part.file.tolist()})
-        for part in (table, division.unseen_episodes)
-    )
-    console.print(
-        f"{seen} episodes to train on, {unseen} to validate on; {len(table)} frames, "
-        f"{pairs_of(table)} ordered pairs, mean |motion| {zero.zero_mean_mm:.1f} mm "
-        f"(predicting no motion: {zero.zero_mse_mm2:.0f} mm², their mean: "
-        f"{zero.mean_mse_mm2:.0f} mm²)"
-    )
+    seen, unseen = (len(part.episodes_seen) for part in (table, division.unseen_episodes))
+    frames = f"{seen} episodes to train on, {unseen} to validate on; {len(table)} frames, "
+    if target == "point":
+        points = table.grasps[table.rest]
+        spread = 1e6 * float(points.var(axis=0).mean()) if len(points) else 0.0
+        console.print(
+            f"{frames}{len(points)} manipulation points (predicting their mean: {spread:.0f} mm²)"
+        )
+    else:
+        zero = no_motion(training)
+        console.print(
+            f"{frames}{pairs_of(table)} ordered pairs, mean |motion| {zero.zero_mean_mm:.1f} mm "
+            f"(predicting no motion: {zero.zero_mse_mm2:.0f} mm², their mean: "
+            f"{zero.mean_mse_mm2:.0f} mm²)"
+        )
     if division.skipped:
         console.print(f"{division.skipped} files without two settled frames left out")
 
@@ -72,27 +78,37 @@ class TrainingBar:
         bar, task = self._progress, self._task
         bar.update(task, completed=event.progress, epoch=f"{event.epoch}/{self._epochs:g}")
         if isinstance(event, EpochDone):
-            validation = f"{event.unseen_episodes.any_pair.mse_mm2:.1f} mm²"
-            bar.update(task, loss=f"{event.loss_mm2:.1f}", validation=validation)
+            validation = f"{event.unseen_episodes.main.mse_mm2:.1f} mm²"
+            bar.update(task, loss=f"{event.loss:.3g}", validation=validation)
 
 
 def error_table(
-    errors: Mapping[str, Errors | None], *, title: str = "errors of the best network"
+    errors: Mapping[str, Errors | None],
+    *,
+    title: str = "errors of the best network",
+    zero: str = "no motion",
 ) -> Table:
-    """Return the errors on each set of frames as a table."""
+    """Return the errors on each set of frames as a table.
+
+    Args:
+        errors: By what they are on.
+        title: Of the table.
+        zero: What predicting zero stands for.
+    """
     table = Table(title=title)
-    names = ("frames of", "pairs", "count", "MSE", "sum", "error", "R²", "no motion")
+    names = ("frames of", "pairs", "count", "MSE", "sum", "error", "R²", zero)
     for name in names:
         table.add_column(name, justify="left" if name in ("frames of", "pairs") else "right")
     for name, of in errors.items():
         if of is None:
             continue
-        table.add_row(name, "any two", *_cells(of.any_pair))
+        if of.any_pair is not None:
+            table.add_row(name, "any two", *_cells(of.any_pair))
         if of.from_rest is not None:
             table.add_row(name, "rest to shape", *_cells(of.from_rest))
     table.caption = (
         "MSE: squared error, mean over x, y, z, mm²; sum: summed over them; error: mean "
-        "Euclidean distance, mm; no motion: MSE of predicting none"
+        f"Euclidean distance, mm; {zero}: MSE of predicting that"
     )
     return table
 

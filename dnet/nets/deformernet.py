@@ -61,22 +61,38 @@ class DeformerNetConfig:
             raise LongCloud("cloud", self.points, MOST_POINTS)
 
 
+class Levels(NamedTuple):
+    """What an encoder finds at each of its levels, coordinates in the network's unit."""
+
+    first: tuple[Float[Tensor, "b s1 3"], Float[Tensor, "b s1 64"]]
+    """Centroids and their features."""
+    second: tuple[Float[Tensor, "b s2 3"], Float[Tensor, "b s2 128"]]
+    whole: Float[Tensor, "b 256"]
+    """Features of the cloud."""
+
+
 class Encoder(nn.Module):
     """Three levels of set abstraction: a cloud becomes 256 numbers."""
 
-    features = 256
+    widths = (64, 128, 256)
+    features = widths[-1]
 
     def __init__(self, norm: Norm, *, density: bool = True) -> None:
         super().__init__()
-        self.first = SetAbstraction(3, 64, norm, density=density)
-        self.second = SetAbstraction(64, 128, norm, density=density)
-        self.third = SetAbstraction(128, self.features, norm, density=density)
+        first, second, third = self.widths
+        self.first = SetAbstraction(3, first, norm, density=density)
+        self.second = SetAbstraction(first, second, norm, density=density)
+        self.third = SetAbstraction(second, third, norm, density=density)
 
     def forward(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch."""
+        return self.levels(clouds).whole
+
+    def levels(self, clouds: Neighbourhoods) -> Levels:
+        """Return what is found at each level, for those who need features of places too."""
         below, scales = clouds.points, clouds.inverse_densities
         middle = gather(below, clouds.centroids)
-        features = self.first(
+        near = self.first(
             below,
             below,
             centroids=middle,
@@ -84,37 +100,37 @@ class Encoder(nn.Module):
             inverse_density=scales[0],
         )
         above = middle[:, : scales[2].shape[1]]
-        features = self.second(
+        far = self.second(
             middle,
-            features,
+            near,
             centroids=above,
             neighbours=clouds.neighbours[1],
             inverse_density=scales[1],
         )
         centre = above.mean(dim=1, keepdim=True)
         whole: Tensor = self.third(
-            above, features, centroids=centre, neighbours=None, inverse_density=scales[2]
+            above, far, centroids=centre, neighbours=None, inverse_density=scales[2]
         )
-        return whole[:, 0]
+        return Levels((middle, near), (above, far), whole[:, 0])
 
 
 class Head(nn.Module):
-    """Fully connected layers: a difference of features becomes a motion."""
+    """Fully connected layers: features, or a difference of them, become three numbers."""
 
-    widths = (Encoder.features, 128, 64, 32)
+    widths = (128, 64, 32)
 
-    def __init__(self, norm: Norm) -> None:
+    def __init__(self, norm: Norm, *, inputs: int = Encoder.features) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for inputs, outputs in pairwise(self.widths):
-            layers += [nn.Linear(inputs, outputs), make_norm(norm, outputs), nn.ReLU(inplace=True)]
+        for below, above in pairwise((inputs, *self.widths)):
+            layers += [nn.Linear(below, above), make_norm(norm, above), nn.ReLU(inplace=True)]
         self.hidden = nn.Sequential(*layers)
         self.output = nn.Linear(self.widths[-1], 3)
 
-    def forward(self, difference: Float[Tensor, "p 256"]) -> Float[Tensor, "p 3"]:
-        """Return the motion in the network's unit."""
-        motion: Tensor = self.output(self.hidden(difference))
-        return motion
+    def forward(self, features: Float[Tensor, "p c"]) -> Float[Tensor, "p 3"]:
+        """Return a motion, or a place, in the network's unit."""
+        answer: Tensor = self.output(self.hidden(features))
+        return answer
 
 
 class DeformerNet(nn.Module):

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32, Int16
+from jaxtyping import Float, Float32, Int16, Integer
 from scipy.spatial import cKDTree
 from torch import Tensor
 
@@ -69,6 +69,10 @@ class Neighbourhoods:
     def pin_memory(self) -> "Neighbourhoods":
         """Return the same tables in memory from which a GPU reads fastest."""
         return self._map(torch.Tensor.pin_memory)
+
+    def take(self, clouds: Integer[Tensor, " k"]) -> "Neighbourhoods":
+        """Return some clouds of a batch, in this order."""
+        return self._map(lambda table: table[clouds])
 
     def _map(self, change: Callable[[Tensor], Tensor]) -> "Neighbourhoods":
         first, second = self.neighbours

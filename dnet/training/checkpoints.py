@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -16,36 +16,35 @@ from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
+from dnet.training.objectives import Network
+
+N = TypeVar("N", bound=Network)
 
 BEST = "best.safetensors"
 """The file that stands for a run directory: the network with the smallest validation error."""
 
-_NETWORK = "DeformerNet"
 # One entry of the header for all: safetensors writes several in a random order, and the same
 # network should give the same bytes.
 _KEY = "dnet"
 _HINT = "give a run directory or a .safetensors file of `dnet train`"
 
 
-def save(
-    path: Path,
-    weights: Mapping[str, Tensor],
-    *,
-    config: DeformerNetConfig,
-    metrics: Mapping[str, Any] | None = None,
-) -> None:
+def save(path: Path, network: Network, *, metrics: Mapping[str, Any] | None = None) -> None:
     """Write a network into the file `path`, whole or not at all.
 
     The file alone is enough to load the network: its header says what the weights are of.
 
     Args:
         path: A `.safetensors` file, replaced if it exists.
-        weights: The network's `state_dict()`.
-        config: Of the network.
+        network: To be written.
         metrics: What is known of it, as JSON, for people.
     """
-    header = {"network": _NETWORK, "config": asdict(config), "metrics": dict(metrics or {})}
-    write_tensors(path, weights, header)
+    header = {
+        "network": type(network).__name__,
+        "config": asdict(network.config),
+        "metrics": dict(metrics or {}),
+    }
+    write_tensors(path, network.state_dict(), header)
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> None:
@@ -71,7 +70,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
 
 
 def load(path: Path) -> DeformerNet:
-    """Return the network that `path` holds, on the CPU and ready to predict.
+    """Return the DeformerNet that `path` holds, on the CPU and ready to predict.
 
     Args:
         path: A run directory, whose best network is taken, or a `.safetensors` file.
@@ -79,19 +78,46 @@ def load(path: Path) -> DeformerNet:
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
     """
+    return load_kind(path, DeformerNet)
+
+
+def load_kind(path: Path, kind: type[N]) -> N:
+    """Return the network of one kind that `path` holds, on the CPU and ready to predict.
+
+    Args:
+        path: A run directory, whose best network is taken, or a `.safetensors` file.
+        kind: The network that it must be.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+    """
+    network = load_any(path)
+    if not isinstance(network, kind):
+        found = f"holds {type(network).__name__}, not {kind.__name__}"
+        raise BadCheckpoint(weights_file(path), found, _HINT)
+    return network
+
+
+def load_any(path: Path) -> Network:
+    """Return the network that `path` holds, of whichever kind, on the CPU and ready to predict.
+
+    Raises:
+        BadCheckpoint: If there is no such file, or it is corrupt, or of an unknown network.
+    """
     file = weights_file(path)
     header, weights = _read(file)
-    if header.get("network") != _NETWORK:
-        found = header.get("network", "an unnamed network")
-        raise BadCheckpoint(file, f"holds {found}, not {_NETWORK}", _HINT)
-    model = DeformerNet(_config(file, header.get("config")))
-    _check_shapes(file, weights, model.state_dict())
-    model.load_state_dict(weights)
-    return model.eval()
+    kinds = {kind.__name__: kind for kind in get_args(Network)}
+    name = header.get("network", "an unnamed network")
+    if name not in kinds:
+        raise BadCheckpoint(file, f"holds {name}, not one of {', '.join(kinds)}", _HINT)
+    network: Network = kinds[name](_config(file, header.get("config")))
+    _check_shapes(file, weights, network.state_dict())
+    network.load_state_dict(weights)
+    return network.eval()
 
 
-def begin_with(model: DeformerNet, path: Path) -> None:
-    """Give `model` the weights that `path` holds.
+def begin_with(model: Network, path: Path) -> None:
+    """Give `model` the weights that `path` holds; of a network of another kind, its encoder.
 
     Args:
         model: An untrained network.
@@ -100,12 +126,15 @@ def begin_with(model: DeformerNet, path: Path) -> None:
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
     """
-    held = load(path)
+    held = load_any(path)
     for name, value in asdict(model.config).items():
         if (other := getattr(held.config, name)) != value:
             why = f"is of a network with {name} {other}, not {value}"
             raise BadCheckpoint(path, why, "give the options that it was trained with")
-    model.load_state_dict(held.state_dict())
+    if type(held) is type(model):
+        model.load_state_dict(held.state_dict())
+    else:
+        model.encoder.load_state_dict(held.encoder.state_dict())
 
 
 def read_metrics(path: Path) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def divide(index: Index, *, fraction: float, seed: int) -> Division:
         raise BadEpisode(index.path(name), note, "remove it, or record it again")
     frames = settled_frames(index)
     paired = frames.where((frames.lengths > 1)[frames.file])
-    ids = sorted({paired.episodes[file] for file in np.unique(paired.file).tolist()})
+    ids = paired.episodes_seen
     if len(ids) < 2:
         raise TooFew(f"number of episodes in {index.root} with two settled frames", len(ids), 2)
     train_ids, held_out = split(ids, fraction=fraction, seed=seed)

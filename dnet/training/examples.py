@@ -15,7 +15,7 @@ from dnet.datasets.stream import Stream
 from dnet.errors import Uneven
 from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.augment import Augmentation, Placement, place, turn
-from dnet.training.frames import Frames, Rows
+from dnet.training.frames import Frames, Rows, Target
 from dnet.training.parallel import Process
 from dnet.training.settings import TrainingSettings
 
@@ -29,20 +29,21 @@ class Examples:
     """Of each pair: which of the clouds is the current one."""
     goal: Int64[Tensor, " p"]
     """Of each pair: which of the clouds is the goal."""
-    motions: Float32[Tensor, "p 3"]
-    """Of the grasp, from current to goal, in metres."""
+    targets: Float32[Tensor, "p 3"]
+    """What a network should answer to each pair, in metres: the motion of the grasp from current
+    to goal, or the manipulation point of the current shape."""
 
     def to(self, device: torch.device) -> "Examples":
         """Return the same batch on `device`."""
-        current, goal, motions = (
+        current, goal, targets = (
             tensor.to(device, non_blocking=True)
-            for tensor in (self.current, self.goal, self.motions)
+            for tensor in (self.current, self.goal, self.targets)
         )
-        return Examples(self.clouds.to(device), current, goal, motions)
+        return Examples(self.clouds.to(device), current, goal, targets)
 
     def pin_memory(self) -> "Examples":
         """Return the batch in memory from which a GPU reads fastest."""
-        pairs = (self.current, self.goal, self.motions)
+        pairs = (self.current, self.goal, self.targets)
         return Examples(self.clouds.pin_memory(), *(tensor.pin_memory() for tensor in pairs))
 
 
@@ -51,6 +52,7 @@ def stream_of(
     settings: TrainingSettings,
     *,
     process: Process,
+    target: Target = "motion",
     workers: int = 0,
     pin: bool = False,
 ) -> Stream[Examples]:
@@ -60,6 +62,8 @@ def stream_of(
         frames: To learn from.
         settings: Of the training.
         process: This one among several, which share each batch.
+        target: What a network should answer. `point`s are learned from groups with a rest shape,
+            all of whose pairs begin with it.
         workers: Processes that read ahead.
         pin: Whether batches go into pinned memory.
 
@@ -71,7 +75,11 @@ def stream_of(
         raise Uneven(settings.batch, process.world)
     variation = Variation(settings.augmentation, settings.seed)
     drawable: AllPairs | SinglePairs
-    if settings.pairs == "all":
+    if target == "point":
+        drawable = AllPairs(
+            frames, size=settings.frames, variation=variation, rest_share=1.0, target=target
+        )
+    elif settings.pairs == "all":
         drawable = AllPairs(
             frames, size=settings.frames, variation=variation, rest_share=settings.rest_share
         )
@@ -131,12 +139,19 @@ class AllPairs(Dataset[Examples]):
         size: The least clouds of a group, except in an episode with fewer; at least two.
         variation: How they vary.
         rest_share: How many groups the rest shape of their episode joins.
+        target: What a network should answer; of `point`s, only pairs from rest are taken.
     """
 
     def __init__(
-        self, frames: Frames, *, size: int, variation: Variation, rest_share: float = 0.0
+        self,
+        frames: Frames,
+        *,
+        size: int,
+        variation: Variation,
+        rest_share: float = 0.0,
+        target: Target = "motion",
     ) -> None:
-        self._frames, self._variation = frames, variation
+        self._frames, self._variation, self._target = frames, variation, target
         self._groups = Groups(frames.clouds, size=size, seed=variation.seed, rest_share=rest_share)
 
     def __len__(self) -> int:
@@ -145,13 +160,18 @@ class AllPairs(Dataset[Examples]):
     def __getitem__(self, drawn: Drawn) -> Examples:
         """Return a batch of groups."""
         chosen = self._groups.choose(drawn)
+        current, goal = chosen.current, chosen.goal
+        if self._target == "point":
+            begun = self._frames.table.rest[chosen.rows[current]]
+            current, goal = current[begun], goal[begun]
         return _examples(
             self._frames,
             self._variation,
             drawn,
             rows=chosen.rows,
             groups=chosen.groups,
-            pairs=(chosen.current, chosen.goal),
+            pairs=(current, goal),
+            target=self._target,
         )
 
     @property
@@ -202,15 +222,18 @@ def _examples(
     rows: Rows,
     groups: Rows,
     pairs: tuple[Rows, Rows],
+    target: Target = "motion",
 ) -> Examples:
     samplings = frames.tables.samplings
     placement, choices = variation.draw(drawn, groups, samplings=samplings)
     clouds = frames.prepared(rows, choices=choices)
     current, goal = pairs
-    motions = torch.from_numpy(frames.motions(rows[current], rows[goal]))
+    targets = torch.from_numpy(frames.targets(target, rows[current], rows[goal]))
     if placement is not None:
         of_clouds, of_pairs = torch.from_numpy(groups), torch.from_numpy(groups[current])
         unit = frames.config.coordinate_unit
         clouds = place(clouds, placement, groups=of_clouds, coordinate_unit=unit)
-        motions = turn(motions, placement, groups=of_pairs)
-    return Examples(clouds, torch.from_numpy(current), torch.from_numpy(goal), motions)
+        targets = turn(targets, placement, groups=of_pairs)
+        if target == "point":
+            targets = targets + placement.shifts[of_pairs]
+    return Examples(clouds, torch.from_numpy(current), torch.from_numpy(goal), targets)

@@ -1,6 +1,7 @@
 """Frames of a dataset as a network takes them: clouds from the logs, tables from beside them."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Int64
@@ -13,6 +14,10 @@ from dnet.training.neighbour_tables import NeighbourTables
 
 Rows = Int64[np.ndarray, "_"]
 """Rows of a table of frames."""
+
+Target = Literal["motion", "point"]
+"""What a network answers to two frames of an episode: the `motion` of the grasp from the one to
+the other, or the manipulation `point` of the first, which is the rest shape."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,12 @@ class Frames:
         """
         clouds = self.clouds.stack(rows)[:, : self.config.points]
         return self.tables.of(rows, clouds, choices=choices)
+
+    def targets(self, target: Target, current: Rows, goal: Rows) -> Float32[np.ndarray, "p 3"]:
+        """Return what a network should answer to pairs of frames, in metres."""
+        if target == "motion":
+            return self.motions(current, goal)
+        return self.table.grasps[current].astype(np.float32)
 
     def motions(self, current: Rows, goal: Rows) -> Float32[np.ndarray, "p 3"]:
         """Return the motion of the grasp between frames, in metres."""

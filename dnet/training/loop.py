@@ -4,15 +4,12 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import torch
-
 from dnet.errors import TooFew
-from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.training.frames import Frames
 from dnet.training.progress import EpochDone, StepDone
 from dnet.training.run import RunWriter
-from dnet.training.scores import errors_of
 from dnet.training.showcase import Showcase
+from dnet.training.tasks import task_of
 from dnet.training.training import Training
 
 SAVE_SECONDS = 300.0
@@ -25,13 +22,6 @@ class HeldOut:
 
     unseen_shapes: Frames
     unseen_episodes: Frames
-
-
-def new_network(config: DeformerNetConfig, *, seed: int) -> DeformerNet:
-    """Return an untrained network whose first weights are a function of `seed`."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        return DeformerNet(config)
 
 
 def _ignore(event: StepDone | EpochDone) -> None:
@@ -92,12 +82,14 @@ def _judged(
 ) -> tuple[EpochDone, dict[str, Showcase]]:
     loss, losses = training.close_epoch()
     network = training.average
+    task = task_of(network)
     showcases = {
-        "unseen shapes": Showcase(held_out.unseen_shapes),
-        "unseen episodes": Showcase(held_out.unseen_episodes),
+        "unseen shapes": Showcase(held_out.unseen_shapes, task.target),
+        "unseen episodes": Showcase(held_out.unseen_episodes, task.target),
     }
     shapes, episodes = (
-        errors_of(network, showcase.frames, watch=showcase.watch) for showcase in showcases.values()
+        task.judge(network, showcase.frames, watch=showcase.watch)
+        for showcase in showcases.values()
     )
     if episodes is None:
         raise TooFew("number of pairs of unseen episodes", 0, 1)
@@ -105,11 +97,11 @@ def _judged(
         epoch=len(run.history) + 1,
         steps=training.steps,
         encodings=training.encodings,
-        loss_mm2=loss,
-        losses_mm2=losses,
+        loss=loss,
+        losses=losses,
         unseen_shapes=shapes,
         unseen_episodes=episodes,
-        best=episodes.any_pair.mse_mm2 < run.least,
+        best=episodes.main.mse_mm2 < run.least,
         learning_rate=training.rate,
         seconds=training.seconds,
         waited=training.waited,

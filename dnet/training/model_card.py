@@ -2,37 +2,41 @@
 
 from collections.abc import Mapping
 
-from dnet.training.run import RunWriter
+from dnet.errors import TooFew
+from dnet.training.run import RunWriter, best_of
 from dnet.training.scores import Errors, Scores
+from dnet.training.tasks import Task
 
 CARD = "MODEL_CARD.md"
 
 _ROW = "| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {} | {:.1f} |"
 
 
-def write_card(run: RunWriter, errors: Mapping[str, Errors | None]) -> None:
+def write_card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) -> None:
     """Write the card of the best network of a run into its directory, whole or not at all.
 
     Args:
         run: Of the training.
         errors: Of that network on each set of frames, by its name.
+        task: That the network is for.
     """
     part = run.path / f".{CARD}.part"
-    part.write_text(card(run, errors), encoding="utf-8")
+    part.write_text(card(run, errors, task), encoding="utf-8")
     part.replace(run.path / CARD)
 
 
-def card(run: RunWriter, errors: Mapping[str, Errors | None]) -> str:
+def card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) -> str:
     """Return the card as Markdown."""
     content = run.content
     network, settings, data = content["network"], content["training"], content["data"]
-    best = min(run.history, key=lambda line: line["unseen_episodes"]["any_pair"]["mse_mm2"])
+    best = best_of(run.history)
+    if best is None:
+        raise TooFew(f"number of epochs of {run.path}", 0, 1)
     frames = data["frames"]
     lines = [
-        "# DeformerNet",
+        f"# {task.network.__name__}",
         "",
-        "Maps the current and the goal cloud of a deformable object to the motion of the gripper "
-        "that holds it (Thach, Kuntz, Hermans 2021; PointConv: Wu, Qi, Fuxin 2019).",
+        task.does,
         "",
         f"- **Network**: {_listed(network)}",
         f"- **Data**: {len(data['training'])} episodes with {frames['training']} frames to learn "
@@ -45,12 +49,13 @@ def card(run: RunWriter, errors: Mapping[str, Errors | None]) -> str:
         f"- **Versions**: {_listed(content['versions'])}",
         "",
         "| frames of | pairs | count | MSE, mm² | sum over xyz, mm² | error, mm | R² | "
-        "MSE of no motion, mm² |",
+        f"MSE of {task.zero}, mm² |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, of in errors.items():
         if of is not None:
-            lines.append(_row(name, "any two of an episode", of.any_pair))
+            if of.any_pair is not None:
+                lines.append(_row(name, "any two of an episode", of.any_pair))
             if of.from_rest is not None:
                 lines.append(_row(name, "rest to shape", of.from_rest))
     lines += [

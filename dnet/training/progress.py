@@ -15,8 +15,8 @@ class StepDone:
     """From 1, within the epoch."""
     steps: int
     """How many the epoch has."""
-    loss_mm2: float
-    """Mean squared error of the batch, before the update."""
+    loss: float
+    """Mean over the batch, before the update: of squared errors in mm², of heat maps in nats."""
     progress: float
     """Share of the whole training that is done, from 0 to 1."""
 
@@ -31,15 +31,15 @@ class EpochDone:
     """Batches since the training began."""
     encodings: int
     """Clouds that were encoded in them."""
-    loss_mm2: float
+    loss: float
     """Mean over the epoch's batches; they come augmented and from weights in motion."""
-    losses_mm2: tuple[float, ...]
+    losses: tuple[float, ...]
     """The same over each of some equal parts of the epoch, for a curve."""
     unseen_shapes: Errors | None
     """On other shapes of the episodes that are trained on; None if they make no pair."""
     unseen_episodes: Errors
     best: bool
-    """Whether no epoch before had a smaller error over any pair of unseen episodes."""
+    """Whether no epoch before had a smaller error on unseen episodes."""
     learning_rate: float
     seconds: float
     """Of training so far, interruptions left out."""

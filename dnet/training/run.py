@@ -2,14 +2,14 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream
-from dnet.nets.deformernet import DeformerNet
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
+from dnet.training.objectives import Network
 from dnet.training.progress import EpochDone
 from dnet.training.scores import Errors
 from dnet.training.training import Training
@@ -59,9 +59,9 @@ class RunWriter:
 
     @property
     def least(self) -> float:
-        """The smallest error over any pair of unseen episodes so far, in mm²."""
-        errors = (line["unseen_episodes"]["any_pair"]["mse_mm2"] for line in self.history)
-        return min(errors, default=math.inf)
+        """The smallest error on unseen episodes so far, in mm²."""
+        best = best_of(self.history)
+        return math.inf if best is None else main_scores(best["unseen_episodes"])["mse_mm2"]
 
     def take_up(self, training: Training) -> bool:
         """Put `training` where the run was put down; return whether there was anything.
@@ -83,12 +83,12 @@ class RunWriter:
             ) from error
         return True
 
-    def add(self, done: EpochDone, network: DeformerNet) -> None:
+    def add(self, done: EpochDone, network: Network) -> None:
         """Write down an epoch and the network that it left."""
-        metrics, weights = asdict(done), network.state_dict()
+        metrics = asdict(done)
         if done.best:
-            save(self.path / BEST, weights, config=network.config, metrics=metrics)
-        save(self.path / LAST, weights, config=network.config, metrics=metrics)
+            save(self.path / BEST, network, metrics=metrics)
+        save(self.path / LAST, network, metrics=metrics)
         self.history.append(json.loads(json.dumps(metrics)))
         self._write_history()
 
@@ -121,6 +121,18 @@ class RunWriter:
         part = self.path / f".{METRICS}.part"
         part.write_text("".join(json.dumps(line) + "\n" for line in self.history), "utf-8")
         part.replace(self.path / METRICS)
+
+
+def best_of(history: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return the epoch whose network was best on unseen episodes, as it was written down."""
+    return min(
+        history, key=lambda line: main_scores(line["unseen_episodes"])["mse_mm2"], default=None
+    )
+
+
+def main_scores(errors: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the scores that networks are chosen by, out of errors as they were written down."""
+    return errors["any_pair"] or errors["from_rest"]
 
 
 def is_finished(run: Path) -> bool:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dnet.datasets.pairs import AnyTwo
+from dnet.errors import TooFew
 from dnet.nets.deformernet import DeformerNet
 from dnet.training.frames import Frames, Rows
 
@@ -45,10 +46,19 @@ class Scores:
 class Errors:
     """Scores of a network on a set of frames."""
 
-    any_pair: Scores
-    """Over all ordered pairs of frames of one episode: what a servo loop meets."""
+    any_pair: Scores | None
+    """Over all ordered pairs of frames of one episode: what a servo loop meets; None of a network
+    that looks at the rest shape alone."""
     from_rest: Scores | None
     """From the rest shape to every other: its first step; None without a rest frame."""
+
+    @property
+    def main(self) -> Scores:
+        """The scores that networks are chosen by."""
+        scores = self.any_pair or self.from_rest
+        if scores is None:
+            raise TooFew("number of pairs that a network is judged by", 0, 1)
+        return scores
 
 
 class Tally:

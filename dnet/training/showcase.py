@@ -2,6 +2,7 @@
 
 import heapq
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -9,7 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dnet.training.division import pairs_of
-from dnet.training.frames import Frames, Rows
+from dnet.training.frames import Frames, Rows, Target
 from dnet.types import Cloud, Point
 
 SHOWN = 1000
@@ -25,12 +26,22 @@ class Pair:
     """Which frames of which episode."""
     current: Cloud
     goal: Cloud
-    grasp: Point
-    """The manipulation point of the current frame, in metres."""
+    origin: Point
+    """Where both answers begin, in metres: the manipulation point of the current frame, or the
+    middle of its cloud."""
     true: Point
-    """The motion of the grasp, in metres."""
+    """The motion of the grasp, or where to grasp, counted from the origin, in metres."""
     predicted: Point
     error_mm: float
+
+
+class _Kept(NamedTuple):
+    error_mm: float
+    current: int
+    """Row of the current frame."""
+    goal: int
+    predicted: Float[Tensor, " 3"]
+    true: Float[Tensor, " 3"]
 
 
 @dataclass
@@ -38,11 +49,14 @@ class Showcase:
     """Watches a network being judged on a set of frames."""
 
     frames: Frames
+    target: Target = "motion"
+    """What the network predicts: motions of the grasp, or points counted from the middle of the
+    current cloud."""
     _seen: int = 0
     _predicted: list[Float[Tensor, "_ 3"]] = field(default_factory=list)
     _true: list[Float[Tensor, "_ 3"]] = field(default_factory=list)
-    _worst: dict[int, tuple[float, int, int, Float[Tensor, " 3"]]] = field(default_factory=dict)
-    """Of each episode: error in millimetres, rows of current and goal, predicted motion."""
+    _worst: dict[int, _Kept] = field(default_factory=dict)
+    """Of each episode."""
 
     def watch(
         self,
@@ -60,9 +74,9 @@ class Showcase:
         errors = 1000 * (predicted - true).norm(dim=1)
         worst = int(errors.argmax())
         file, error = int(self.frames.table.file[current[worst]]), float(errors[worst])
-        if error > self._worst.get(file, (0.0,))[0]:
+        if file not in self._worst or error > self._worst[file].error_mm:
             rows = int(current[worst]), int(goal[worst])
-            self._worst[file] = (error, *rows, predicted[worst].clone())
+            self._worst[file] = _Kept(error, *rows, predicted[worst].clone(), true[worst].clone())
 
     @property
     def motions(self) -> tuple[Float[Tensor, "_ 3"], Float[Tensor, "_ 3"]]:
@@ -74,19 +88,19 @@ class Showcase:
         """Return the worst pairs, each of another episode, the worst first."""
         table = self.frames.table
         pairs = []
-        for error, current, goal, predicted in heapq.nlargest(
-            WORST, self._worst.values(), key=lambda kept: kept[0]
-        ):
-            name = table.episodes[int(table.file[current])]
+        for kept in heapq.nlargest(WORST, self._worst.values(), key=lambda kept: kept.error_mm):
+            name = table.episodes[int(table.file[kept.current])]
+            cloud = self.frames.clouds[kept.current]
+            motion = self.target == "motion"
             pairs.append(
                 Pair(
-                    f"{name} {table.frame[current]} → {table.frame[goal]}",
-                    self.frames.clouds[current],
-                    self.frames.clouds[goal],
-                    table.grasps[current],
-                    table.grasps[goal] - table.grasps[current],
-                    predicted.numpy().astype(np.float64),
-                    error,
+                    f"{name} {table.frame[kept.current]} → {table.frame[kept.goal]}",
+                    cloud,
+                    self.frames.clouds[kept.goal],
+                    table.grasps[kept.current] if motion else cloud.mean(axis=0, dtype=np.float64),
+                    kept.true.numpy().astype(np.float64),
+                    kept.predicted.numpy().astype(np.float64),
+                    kept.error_mm,
                 )
             )
         return pairs

@@ -11,9 +11,8 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
 
 from dnet.datasets.stream import Stream
-from dnet.nets.deformernet import DeformerNet
-from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.examples import Examples
+from dnet.training.objectives import Network, Objective
 from dnet.training.parallel import Process
 from dnet.training.progress import StepDone
 from dnet.training.settings import TrainingSettings
@@ -24,24 +23,6 @@ CURVE = 20
 """Points of an epoch in the curve of its losses."""
 
 
-class Pairwise(nn.Module):
-    """A network on a batch of pairs, as one call: what several processes average the gradient of.
-
-    Args:
-        network: To be trained.
-    """
-
-    def __init__(self, network: DeformerNet) -> None:
-        super().__init__()
-        self.network = network
-
-    def forward(self, clouds: Neighbourhoods, current: Tensor, goal: Tensor) -> Tensor:
-        """Return the motion of each pair, in the network's unit."""
-        features = self.network.encode(clouds)
-        motions = self.network.motion(features[current], features[goal])
-        return motions / self.network.config.motion_unit
-
-
 class Training:
     """Learns batch by batch; its state can be saved after any of them.
 
@@ -49,7 +30,7 @@ class Training:
     alone, wherever it was put down in between.
 
     Args:
-        model: To be trained, on any device.
+        objective: The network to be trained, on any device, and its loss.
         stream: Of batches.
         settings: How.
         process: This one among several.
@@ -59,14 +40,15 @@ class Training:
 
     def __init__(
         self,
-        model: DeformerNet,
+        objective: Objective,
         stream: Stream[Examples],
         settings: TrainingSettings,
         *,
         process: Process | None = None,
         seconds: float = math.inf,
     ) -> None:
-        self.model = model
+        self.objective = objective
+        self.model = model = objective.network
         self.settings = settings
         self.process = process or Process()
         self.stream = stream
@@ -78,7 +60,7 @@ class Training:
         self.waited = 0.0
         """Seconds spent waiting for the loader."""
         self.losses: list[float] = []
-        """In mm², of the batches of this epoch."""
+        """Of the batches of this epoch, as they are told."""
         self.stopped = False
         """Whether a process was asked to stop: all of them do, after the same batch."""
         self._asked = False
@@ -86,7 +68,7 @@ class Training:
         self._before = 0.0
         self._began = time.monotonic()
         self._device = next(model.parameters()).device
-        self._pairwise = self.process.joined(Pairwise(model))
+        self._joined = self.process.joined(objective)
         self._optimizer = torch.optim.Adam(
             model.parameters(), lr=settings.learning_rate, fused=True
         )
@@ -108,9 +90,9 @@ class Training:
         return float(self._optimizer.param_groups[0]["lr"])
 
     @property
-    def average(self) -> DeformerNet:
+    def average(self) -> Network:
         """The network with averaged weights: the one to judge and to keep."""
-        return cast(DeformerNet, self._average.module)
+        return cast(Network, self._average.module)
 
     def stop(self) -> None:
         """Ask for an end after the next batch."""
@@ -139,36 +121,34 @@ class Training:
         return losses.mean().item(), tuple(part.mean().item() for part in parts)
 
     def _step(self, batch: Examples) -> float:
-        """Learn from a batch; return its mean squared error in mm² over all processes."""
+        """Learn from a batch; return its mean loss over all processes, as it is told."""
         batch = batch.to(self._device)
         for group in self._optimizer.param_groups:
             # The stream has counted the batch that is being learned from.
             group["lr"] = self.settings.rate(self._progress(self.stream.batch - 1), step=self.steps)
         self._optimizer.zero_grad(set_to_none=True)
         with self._precision():
-            predicted = self._pairwise(batch.clouds, batch.current, batch.goal)
-        # In the network's unit, errors and so gradients are near 1.
-        unit = self.model.config.motion_unit
-        squares = (predicted.float() - batch.motions / unit).square().sum()
+            losses = self._joined(batch.clouds, batch.current, batch.goal, batch.targets)
+        loss = losses.sum()
         told = (
-            batch.motions.numel(),
-            squares.item(),
+            len(losses),
+            loss.item(),
             len(batch.clouds.points),
             self.seconds,
             self._asked,
         )
         total = torch.tensor(told, dtype=torch.float64, device=self._device)
-        numbers, error, clouds, seconds, asked = self.process.sum(total).tolist()
+        pairs, together, clouds, seconds, asked = self.process.sum(total).tolist()
         # Clocks differ, and learning rates must not.
         self._elapsed, self.stopped = seconds / self.process.world, asked > 0
         # Processes average gradients; what is wanted is the mean over the pairs of all of them.
-        torch.autograd.backward(squares * (self.process.world / numbers))
+        torch.autograd.backward(loss * (self.process.world / pairs))
         nn.utils.clip_grad_norm_(self.model.parameters(), self.settings.gradient_limit)
         self._optimizer.step()
         self._average.update_parameters(self.model)
         self.steps += 1
         self.encodings += int(clouds)
-        return error / numbers * (unit * 1000) ** 2
+        return together / pairs * self.objective.shown
 
     def _progress(self, batches: int) -> float:
         epochs = (self.stream.epoch + batches / len(self.stream)) / self.settings.epochs

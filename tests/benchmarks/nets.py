@@ -28,7 +28,7 @@ from dnet.nets.deformernet import DeformerNet, DeformerNetConfig, prepare
 from dnet.nets.fused import step_by_step
 from dnet.nets.neighbourhoods import Size, stack
 from dnet.training.allocation import keep_pages
-from dnet.training.loop import new_network
+from dnet.training.tasks import new_network
 from dnet.types import Cloud
 from tests.nets import reference
 

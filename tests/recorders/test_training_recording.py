@@ -104,11 +104,11 @@ def test_it_brings_its_layout_along(recording: Path) -> None:
 
 
 def test_losses_are_a_curve_and_a_curve_of_logarithms(recording: Path) -> None:
-    assert curve(recording, "/loss") == [(point.step, point.loss_mm2) for point in LOSSES]
+    assert curve(recording, "/loss") == [(point.step, point.loss) for point in LOSSES]
     logarithms = curve(recording, "/log10/loss")
     assert [step for step, _ in logarithms] == [point.step for point in LOSSES]
     np.testing.assert_allclose(
-        [10**value for _, value in logarithms], [point.loss_mm2 for point in LOSSES]
+        [10**value for _, value in logarithms], [point.loss for point in LOSSES]
     )
 
 

@@ -9,12 +9,14 @@ from dnet.training import loop
 from dnet.training.checkpoints import load
 from dnet.training.examples import stream_of
 from dnet.training.frames import Frames
-from dnet.training.loop import HeldOut, fit, new_network
+from dnet.training.loop import HeldOut, fit
+from dnet.training.objectives import MotionError
 from dnet.training.parallel import Process
 from dnet.training.progress import EpochDone, StepDone
 from dnet.training.run import RunWriter
 from dnet.training.scores import errors_of
 from dnet.training.settings import TrainingSettings
+from dnet.training.tasks import new_network
 from dnet.training.training import Training, Weights
 from tests.training.deforming_box import SMALL, box_frames
 
@@ -35,7 +37,7 @@ def held_out(tmp_path_factory: pytest.TempPathFactory) -> HeldOut:
 
 def begin(frames: Frames, settings: TrainingSettings = SETTINGS) -> Training:
     stream = stream_of(frames, settings, process=Process())
-    return Training(new_network(SMALL, seed=settings.seed), stream, settings)
+    return Training(MotionError(new_network(SMALL, seed=settings.seed)), stream, settings)
 
 
 def same(one: Weights, other: Weights) -> bool:
@@ -61,7 +63,7 @@ def test_training_learns_motions_of_an_object_that_it_has_not_seen(
 ) -> None:
     run = RunWriter(tmp_path, CONTENT)
     fit(begin(frames, TrainingSettings(epochs=40, groups=1, frames=3)), held_out, run=run)
-    losses = [line["loss_mm2"] for line in run.history]
+    losses = [line["loss"] for line in run.history]
     assert losses[-1] < losses[0] / 2
     errors = run.history[-1]["unseen_episodes"]["any_pair"]
     assert run.least < errors["zero_mse_mm2"] / 2
@@ -78,7 +80,7 @@ def test_the_best_network_is_that_of_the_least_error_on_unseen_episodes(
     def keep(event: StepDone | EpochDone) -> None:
         if isinstance(event, EpochDone):
             network = {name: one.clone() for name, one in training.average.state_dict().items()}
-            seen.append((event.unseen_episodes.any_pair.mse_mm2, network))
+            seen.append((event.unseen_episodes.main.mse_mm2, network))
             assert event.best == (seen[-1][0] == min(error for error, _ in seen))
 
     fit(training, held_out, run=run, on_event=keep)
@@ -86,7 +88,7 @@ def test_the_best_network_is_that_of_the_least_error_on_unseen_episodes(
     assert same(load(tmp_path / "last.safetensors").state_dict(), seen[-1][1])
     errors = errors_of(load(tmp_path), held_out.unseen_episodes)
     assert errors is not None
-    assert errors.any_pair.mse_mm2 == pytest.approx(run.least)
+    assert errors.main.mse_mm2 == pytest.approx(run.least)
 
 
 def test_events_tell_every_step_and_every_epoch(

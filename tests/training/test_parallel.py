@@ -52,9 +52,9 @@ def test_two_processes_have_the_loss_curve_of_one_with_the_same_batch(
     together = train(data, tmp_path / "together", processes=2)
     assert [line["steps"] for line in together] == [line["steps"] for line in alone]
     # Rounding differs from the first batch on, and grows with every one that follows.
-    assert together[0]["losses_mm2"] == pytest.approx(alone[0]["losses_mm2"], rel=1e-4)
+    assert together[0]["losses"] == pytest.approx(alone[0]["losses"], rel=1e-4)
     for one, other in zip(alone, together, strict=True):
-        assert other["losses_mm2"] == pytest.approx(one["losses_mm2"], rel=5e-3)
+        assert other["losses"] == pytest.approx(one["losses"], rel=5e-3)
         errors = [line["unseen_episodes"]["any_pair"]["mse_mm2"] for line in (one, other)]
         assert errors[1] == pytest.approx(errors[0], rel=5e-3)
     first, second = (load(tmp_path / name).state_dict() for name in ("alone", "together"))

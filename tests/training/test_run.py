@@ -10,12 +10,13 @@ from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun
 from dnet.training.checkpoints import load, read_metrics
 from dnet.training.examples import stream_of
 from dnet.training.frames import Frames
-from dnet.training.loop import new_network
+from dnet.training.objectives import MotionError
 from dnet.training.parallel import Process
 from dnet.training.progress import EpochDone
 from dnet.training.run import RunWriter, read_config
 from dnet.training.scores import Errors, score
 from dnet.training.settings import TrainingSettings
+from dnet.training.tasks import new_network
 from dnet.training.training import Training
 from tests.training.deforming_box import SMALL, box_frames
 
@@ -34,7 +35,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
 def begin(frames: Frames) -> Training:
     settings = TrainingSettings(epochs=2, groups=1, frames=3)
     stream = stream_of(frames, settings, process=Process())
-    return Training(new_network(SMALL, seed=0), stream, settings)
+    return Training(MotionError(new_network(SMALL, seed=0)), stream, settings)
 
 
 def epoch(number: int, *, best: bool) -> EpochDone:
@@ -74,7 +75,7 @@ def test_a_run_holds_its_config_a_line_an_epoch_and_the_best_and_last_network(
         assert all(torch.equal(got[key], network[key]) for key in network)
         assert read_metrics(file) == want[seed]
     assert len(list(run.iterdir())) == 4
-    assert writer.least == epochs[0].unseen_episodes.any_pair.mse_mm2
+    assert writer.least == epochs[0].unseen_episodes.main.mse_mm2
 
 
 def test_epochs_after_the_training_was_put_down_come_again(tmp_path: Path, frames: Frames) -> None:
@@ -106,7 +107,9 @@ def test_a_state_of_another_network_is_refused(tmp_path: Path, frames: Frames) -
     settings = TrainingSettings(epochs=2, groups=1, frames=3)
     network = new_network(SMALL, seed=0)
     network.head.output = torch.nn.Linear(32, 4)
-    training = Training(network, stream_of(frames, settings, process=Process()), settings)
+    training = Training(
+        MotionError(network), stream_of(frames, settings, process=Process()), settings
+    )
     with pytest.raises(BadCheckpoint, match=r"state\.safetensors does not fit this training"):
         RunWriter(tmp_path, CONTENT, resume=True).take_up(training)
 

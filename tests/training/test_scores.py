@@ -7,8 +7,8 @@ from torch import Tensor
 
 from dnet.nets.deformernet import DeformerNet
 from dnet.training.frames import Frames, Rows
-from dnet.training.loop import new_network
 from dnet.training.scores import errors_of, no_motion, score
+from dnet.training.tasks import new_network
 from tests.training.deforming_box import SMALL, BoxEpisode, box_frames
 
 
@@ -69,8 +69,8 @@ def test_errors_are_those_of_predicting_every_pair(model: DeformerNet, frames: F
                     if current.kind == "rest":
                         from_rest.append(error)
     assert errors is not None
-    assert errors.any_pair.pairs == len(squares) == 60
-    assert errors.any_pair.mse_mm2 == pytest.approx(np.mean(squares), rel=1e-4)
+    assert errors.main.pairs == len(squares) == 60
+    assert errors.main.mse_mm2 == pytest.approx(np.mean(squares), rel=1e-4)
     assert errors.from_rest is not None
     assert errors.from_rest.pairs == len(from_rest) == 10
     assert errors.from_rest.mse_mm2 == pytest.approx(np.mean(from_rest), rel=1e-4)
@@ -92,7 +92,7 @@ def test_frames_without_a_rest_shape_have_no_score_from_rest(
     table = frames.table.where(~frames.table.rest)
     errors = errors_of(model, Frames.of(table, SMALL))
     assert errors is not None
-    assert errors.any_pair.pairs == 40
+    assert errors.main.pairs == 40
     assert errors.from_rest is None
 
 
@@ -113,11 +113,11 @@ def test_whoever_watches_is_told_of_every_pair(model: DeformerNet, frames: Frame
     errors = errors_of(model, frames, watch=watch)
     assert errors is not None
     assert len(told) == len(set(told)) == 60
-    assert np.mean(squares) == pytest.approx(errors.any_pair.mse_mm2)
+    assert np.mean(squares) == pytest.approx(errors.main.mse_mm2)
 
 
 def test_no_motion_is_scored_on_every_pair(model: DeformerNet, frames: Frames) -> None:
     errors, nothing = errors_of(model, frames), no_motion(frames)
     assert errors is not None
     assert nothing.pairs == 60
-    assert nothing.mse_mm2 == pytest.approx(errors.any_pair.zero_mse_mm2)
+    assert nothing.mse_mm2 == pytest.approx(errors.main.zero_mse_mm2)

@@ -3,9 +3,9 @@ import pytest
 import torch
 
 from dnet.training.frames import Frames
-from dnet.training.loop import new_network
 from dnet.training.scores import errors_of
 from dnet.training.showcase import WORST, Showcase
+from dnet.training.tasks import new_network
 from tests.training.deforming_box import SMALL, box_frames
 
 

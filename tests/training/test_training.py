@@ -10,9 +10,10 @@ from dnet.nets.deformernet import DeformerNet
 from dnet.nets.pointconv import Norm
 from dnet.training.examples import stream_of
 from dnet.training.frames import Frames
-from dnet.training.loop import new_network
+from dnet.training.objectives import MotionError
 from dnet.training.parallel import Process
 from dnet.training.settings import TrainingSettings
+from dnet.training.tasks import new_network
 from dnet.training.training import Training, Weights
 from tests.training.deforming_box import SMALL, box_frames
 
@@ -33,7 +34,10 @@ def begin(
 ) -> Training:
     stream = stream_of(frames, settings, process=Process(), workers=workers)
     return Training(
-        new_network(frames.config, seed=settings.seed), stream, settings, seconds=seconds
+        MotionError(new_network(frames.config, seed=settings.seed)),
+        stream,
+        settings,
+        seconds=seconds,
     )
 
 
@@ -41,7 +45,7 @@ def run(training: Training) -> list[float]:
     """Train to the end and return the loss of every batch."""
     losses = []
     while training.progress < 1:
-        losses += [step.loss_mm2 for step in training.epoch()]
+        losses += [step.loss for step in training.epoch()]
         training.close_epoch()
     return losses
 
@@ -70,7 +74,7 @@ def test_a_training_goes_on_as_if_it_had_never_been_put_down(frames: Frames, bat
     first = begin(frames)
     begun: list[float] = []
     while len(begun) < batches:
-        begun += [step.loss_mm2 for step in islice(first.epoch(), batches - len(begun))]
+        begun += [step.loss for step in islice(first.epoch(), batches - len(begun))]
         if first.stream.batch == 0:
             first.close_epoch()
     second = begin(frames, workers=2)
@@ -147,7 +151,7 @@ def test_progress_only_grows(frames: Frames) -> None:
 
 def test_the_curve_of_an_epoch_averages_to_its_loss(frames: Frames) -> None:
     training = begin(frames)
-    losses = [step.loss_mm2 for step in training.epoch()]
+    losses = [step.loss for step in training.epoch()]
     mean, curve = training.close_epoch()
     assert mean == pytest.approx(sum(losses) / len(losses))
     assert curve == pytest.approx(losses)
@@ -165,6 +169,6 @@ def test_either_norm_learns_and_low_precision_learns_about_the_same(
     assert sum(losses[-12:]) < 0.7 * sum(losses[:12])
     assert training.encodings == 20 * len(boxes.table)
     rough = begin(boxes, replace(settings, precision="bfloat16"))
-    first = [step.loss_mm2 for step in rough.epoch()]
+    first = [step.loss for step in rough.epoch()]
     assert first == pytest.approx(losses[: len(first)], rel=0.1)
     assert first != losses[: len(first)]

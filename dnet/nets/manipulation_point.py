@@ -1,0 +1,183 @@
+"""Where to grasp, from the initial and the goal cloud: x_m = f(cloud_0, cloud_g).
+
+Two networks on the encoder of DeformerNet: `PointRegressor` puts out a position (Thach, Kuntz and
+Hermans, DeformerNet, 2021, section on manipulation points), `DensePredictor` a score for every
+point of the initial cloud, the idea of the same group's later dense predictor (T-RO 2024), so that
+its answer lies on the surface and its doubt can be seen.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float, Float32, Int64
+from torch import Tensor, nn
+from torch.nn import functional
+
+from dnet.nets.deformernet import DeformerNetConfig, Encoder, Head, centroid, prepare
+from dnet.nets.neighbourhoods import Neighbourhoods, stack
+from dnet.nets.pointconv import gather, make_norm
+from dnet.types import Cloud, Point
+
+
+class Chosen(NamedTuple):
+    """What a network makes of two clouds."""
+
+    point: Point
+    """Where to grasp, in metres."""
+    probabilities: Float32[np.ndarray, " n"] | None
+    """Of each point of the initial cloud that was scored; None of a regressor."""
+
+
+class PointRegressor(nn.Module):
+    """DeformerNet with a position as its output.
+
+    The position is counted from the mean of the initial cloud; the head sees what the object
+    looks like at rest besides how the goal differs, for a place depends on both.
+    """
+
+    def __init__(self, config: DeformerNetConfig | None = None) -> None:
+        super().__init__()
+        self.config = config or DeformerNetConfig()
+        self.encoder = Encoder(self.config.norm, density=self.config.density)
+        self.head = Head(self.config.norm, inputs=2 * Encoder.features)
+
+    def forward(
+        self, initial: Neighbourhoods, goal: Neighbourhoods, of: Int64[Tensor, " p"]
+    ) -> Float[Tensor, "p 3"]:
+        """Return where to grasp, in metres.
+
+        Args:
+            initial: A batch of clouds at rest.
+            goal: A batch of p goals.
+            of: Which of the initial clouds each goal belongs to.
+        """
+        here, there = self.encoder(initial)[of], self.encoder(goal)
+        offset: Tensor = self.head(torch.cat([there - here, here], dim=1))
+        return middle(initial, self.config)[of] + offset * self.config.motion_unit
+
+    @torch.no_grad()
+    def choose(self, initial: Cloud, goal: Cloud) -> Chosen:
+        """Return where to grasp; the answer may lie off the surface.
+
+        Raises:
+            ShortCloud, LongCloud: If a cloud has not the number of points that the network takes.
+            BadCloud: If a coordinate is NaN or infinite.
+        """
+        here, there = _prepared(initial, goal, self.config)
+        point = self(here, there, torch.zeros(1, dtype=torch.int64))[0]
+        return Chosen(point.numpy().astype(np.float64), None)
+
+
+class DensePredictor(nn.Module):
+    """A score for each point of the initial cloud: how likely it is the manipulation point.
+
+    A point knows its place, what lies around it (features of the three nearest centroids of both
+    levels, weighed by inverse distance: feature propagation of PointNet++, Qi et al. 2017), and
+    how the goal differs from the initial shape as a whole.
+    """
+
+    hidden = (128, 64)
+
+    def __init__(self, config: DeformerNetConfig | None = None) -> None:
+        super().__init__()
+        self.config = config or DeformerNetConfig()
+        norm = self.config.norm
+        self.encoder = Encoder(norm, density=self.config.density)
+        first, second = self.hidden
+        self.place = nn.Linear(3, first)
+        self.near = nn.Linear(Encoder.widths[0], first, bias=False)
+        self.far = nn.Linear(Encoder.widths[1], first, bias=False)
+        self.whole = nn.Linear(2 * Encoder.features, first, bias=False)
+        self.first_norm = make_norm(norm, first)
+        self.second = nn.Linear(first, second)
+        self.second_norm = make_norm(norm, second)
+        self.output = nn.Linear(second, 1)
+
+    def forward(
+        self,
+        initial: Neighbourhoods,
+        goal: Neighbourhoods,
+        of: Int64[Tensor, " p"],
+        *,
+        count: int | None = None,
+    ) -> Float[Tensor, "p n"]:
+        """Return the score of each point of the initial cloud, the logarithm of a probability.
+
+        Args:
+            initial: A batch of clouds at rest.
+            goal: A batch of p goals.
+            of: Which of the initial clouds each goal belongs to.
+            count: How many points to score, the first ones; all, unless given.
+        """
+        seen = self.encoder.levels(initial)
+        points = initial.points[:, :count]
+        centred = points - initial.points.mean(dim=1, keepdim=True)
+        local = self.place(centred)
+        for layer, (places, features) in zip(
+            (self.near, self.far), (seen.first, seen.second), strict=True
+        ):
+            # The layer commutes with the interpolation, and there are few centroids.
+            local = local + propagate(points, places, layer(features))
+        here, there = seen.whole[of], self.encoder(goal)
+        whole = self.whole(torch.cat([there - here, here], dim=1))
+        hidden = functional.relu(self.first_norm(local[of] + whole[:, None]))
+        hidden = functional.relu(self.second_norm(self.second(hidden)))
+        scores: Tensor = self.output(hidden)[..., 0]
+        return functional.log_softmax(scores, dim=1)
+
+    @torch.no_grad()
+    def choose(self, initial: Cloud, goal: Cloud) -> Chosen:
+        """Return which point of the initial cloud to grasp, and how likely each of them is.
+
+        Raises:
+            ShortCloud, LongCloud: If a cloud has not the number of points that the network takes.
+            BadCloud: If a coordinate is NaN or infinite.
+        """
+        here, there = _prepared(initial, goal, self.config)
+        scores = self(here, there, torch.zeros(1, dtype=torch.int64))
+        points = torch.from_numpy(np.array(initial))[None]
+        point = most_likely(scores, points)[0].numpy().astype(np.float64)
+        return Chosen(point, scores[0].exp().numpy())
+
+
+def most_likely(
+    scores: Float[Tensor, "p n"], points: Float[Tensor, "p n 3"], *, radius: float = 0.01
+) -> Float[Tensor, "p 3"]:
+    """Return the point with the most probability around it, out of those that were scored.
+
+    Args:
+        scores: Logarithms of probabilities.
+        points: In metres.
+        radius: Of what counts as around it, in metres (a Gaussian's standard deviation).
+    """
+    found = []
+    for score, cloud in zip(scores, points, strict=True):
+        distances = torch.cdist(cloud, cloud, compute_mode="donot_use_mm_for_euclid_dist")
+        around = torch.exp(-0.5 * (distances / radius).square()) @ score.exp()
+        found.append(cloud[around.argmax()])
+    return torch.stack(found)
+
+
+def propagate(
+    points: Float[Tensor, "b n 3"], places: Float[Tensor, "b s 3"], values: Float[Tensor, "b s c"]
+) -> Float[Tensor, "b n c"]:
+    """Return values at points, from the three places nearest to each."""
+    distances = torch.cdist(points, places, compute_mode="donot_use_mm_for_euclid_dist")
+    near, rows = distances.topk(3, dim=2, largest=False)
+    weights = 1 / (near + 1e-6)
+    weights = weights / weights.sum(dim=2, keepdim=True)
+    return (gather(values, rows) * weights[..., None]).sum(dim=2)
+
+
+def middle(clouds: Neighbourhoods, config: DeformerNetConfig) -> Float[Tensor, "b 3"]:
+    """Return the mean of the points of each cloud, in metres."""
+    return clouds.points.mean(dim=1) * config.coordinate_unit
+
+
+def _prepared(
+    initial: Cloud, goal: Cloud, config: DeformerNetConfig
+) -> tuple[Neighbourhoods, Neighbourhoods]:
+    centre = centroid(initial)
+    here = prepare(initial, config, what="initial cloud", centre=centre)
+    return stack([here]), stack([prepare(goal, config, what="goal cloud", centre=centre)])

@@ -1,0 +1,119 @@
+"""What each network is trained to do: from a batch to the loss of each of its pairs."""
+
+from abc import ABC, abstractmethod
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor, nn
+
+from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor
+from dnet.nets.neighbourhoods import Neighbourhoods
+
+Network = DeformerNet | PointRegressor | DensePredictor
+"""What can be trained."""
+
+LABEL_RADIUS = 0.005
+"""Standard deviation of the Gaussian about the manipulation point that scores are compared with,
+in metres: about the distance between the points of a cloud that are scored."""
+SCORED = 512
+"""Points of a cloud that are scored in training, its first ones, the farthest from each other."""
+
+
+class Objective(nn.Module, ABC):
+    """A network and its loss, as one call: what several processes average the gradient of."""
+
+    network: Network
+    config: DeformerNetConfig
+    """Of the network."""
+    shown: float
+    """What a loss is multiplied with to be told: squared errors in mm²."""
+
+    @abstractmethod
+    def forward(
+        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+    ) -> Float[Tensor, " p"]:
+        """Return the loss of each pair; near 1 for an untrained network.
+
+        Args:
+            clouds: A batch.
+            current: Of each pair: which of the clouds is the current one.
+            goal: Of each pair: which is the goal.
+            targets: Of each pair: the true answer, in metres, (p, 3).
+        """
+
+
+class MotionError(Objective):
+    """Squared error of DeformerNet's motions, mean over x, y, z, in its unit."""
+
+    network: DeformerNet
+
+    def __init__(self, network: DeformerNet) -> None:
+        super().__init__()
+        self.network, self.config = network, network.config
+        self.shown = (1000 * network.config.motion_unit) ** 2
+
+    def forward(
+        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+    ) -> Float[Tensor, " p"]:
+        """Return the squared error of each pair's motion."""
+        features = self.network.encode(clouds)
+        motions = self.network.motion(features[current], features[goal])
+        return _squared(motions, targets, unit=self.config.motion_unit)
+
+
+class PointError(Objective):
+    """Squared error of a regressor's points, mean over x, y, z, in its unit."""
+
+    network: PointRegressor
+
+    def __init__(self, network: PointRegressor) -> None:
+        super().__init__()
+        self.network, self.config = network, network.config
+        self.shown = (1000 * network.config.motion_unit) ** 2
+
+    def forward(
+        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+    ) -> Float[Tensor, " p"]:
+        """Return the squared error of each pair's point."""
+        rests, of = torch.unique(current, return_inverse=True)
+        points = self.network(clouds.take(rests), clouds.take(goal), of)
+        return _squared(points, targets, unit=self.config.motion_unit)
+
+
+class HeatMap(Objective):
+    """How far a dense predictor's scores are from a Gaussian about the manipulation point.
+
+    The Kullback-Leibler divergence of the one from the other, in nats.
+    """
+
+    network: DensePredictor
+
+    shown = 1.0
+
+    def __init__(self, network: DensePredictor) -> None:
+        super().__init__()
+        self.network, self.config = network, network.config
+
+    def forward(
+        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+    ) -> Float[Tensor, " p"]:
+        """Return the divergence of each pair's scores."""
+        rests, of = torch.unique(current, return_inverse=True)
+        initial = clouds.take(rests)
+        scores = self.network(initial, clouds.take(goal), of, count=SCORED).float()
+        labels = self._labels(initial.points[:, :SCORED], of, targets)
+        return (labels.exp() * (labels - scores)).sum(dim=1)
+
+    def _labels(
+        self, points: Float[Tensor, "b n 3"], of: Int64[Tensor, " p"], targets: Float[Tensor, "p 3"]
+    ) -> Float[Tensor, "p n"]:
+        places = points[of] * self.config.coordinate_unit
+        squares = (places - targets[:, None]).square().sum(dim=2)
+        return torch.log_softmax(-squares / (2 * LABEL_RADIUS**2), dim=1)
+
+
+def _squared(
+    found: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"], *, unit: float
+) -> Float[Tensor, " p"]:
+    return ((found.float() - true) / unit).square().mean(dim=1)

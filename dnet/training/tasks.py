@@ -1,0 +1,80 @@
+"""What can be trained: each network with its loss, its targets and its judge."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import torch
+
+from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor
+from dnet.training.frames import Target
+from dnet.training.objectives import HeatMap, MotionError, Network, Objective, PointError
+from dnet.training.point_scores import point_errors
+from dnet.training.scores import Errors, errors_of
+
+Model = Literal["deformernet", "grasp", "dense"]
+"""`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
+`dense`: where to grasp, as a score for each point."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A network and how it is trained and judged."""
+
+    network: type[Network]
+    objective: Callable[[Any], Objective]
+    target: Target
+    judge: Callable[..., Errors | None]
+    """`errors_of`, or what takes its place."""
+    does: str
+    """What the network does, for its card."""
+    zero: str
+    """What predicting zero stands for."""
+
+    def new(self, config: DeformerNetConfig, *, seed: int) -> Network:
+        """Return an untrained network whose first weights are a function of `seed`."""
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            return self.network(config)
+
+
+TASKS: dict[Model, Task] = {
+    "deformernet": Task(
+        DeformerNet,
+        MotionError,
+        "motion",
+        errors_of,
+        "Maps the current and the goal cloud of a deformable object to the motion of the gripper "
+        "that holds it (Thach, Kuntz, Hermans 2021; PointConv: Wu, Qi, Fuxin 2019).",
+        "no motion",
+    ),
+    "grasp": Task(
+        PointRegressor,
+        PointError,
+        "point",
+        point_errors,
+        "Maps the initial and the goal cloud of a deformable object to the point at which to "
+        "grasp it (Thach, Kuntz, Hermans 2021; PointConv: Wu, Qi, Fuxin 2019).",
+        "the middle",
+    ),
+    "dense": Task(
+        DensePredictor,
+        HeatMap,
+        "point",
+        point_errors,
+        "Maps the initial and the goal cloud of a deformable object to a probability for each "
+        "point of the initial cloud that it is the one to grasp (PointConv: Wu, Qi, Fuxin 2019).",
+        "the middle",
+    ),
+}
+
+
+def task_of(network: Network) -> Task:
+    """Return the task that `network` is for."""
+    return next(task for task in TASKS.values() if task.network is type(network))
+
+
+def new_network(config: DeformerNetConfig, *, seed: int) -> DeformerNet:
+    """Return an untrained DeformerNet whose first weights are a function of `seed`."""
+    return cast(DeformerNet, TASKS["deformernet"].new(config, seed=seed))
