@@ -587,3 +587,13 @@ class UnknownAblation(DnetError, LookupError):
 
     def __init__(self, name: str, names: list[str]) -> None:
         super().__init__(f"there is no ablation {name!r}; there are {', '.join(names)}")
+
+
+class NoDisplacement(DnetError, ValueError):
+    """A goal that the object has already, so that no point of it needs to be moved."""
+
+    def __init__(self, what: str, got: float, least: float) -> None:
+        super().__init__(
+            f"{what} {got * 1e3:.1f} mm from the initial shape, need at least {least * 1e3:.1f} mm "
+            "to tell where to grasp; choose a goal further away, or give the manipulation point"
+        )

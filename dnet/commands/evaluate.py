@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.train import Train
 
 if TYPE_CHECKING:
@@ -158,13 +159,14 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure: a `network` on a dataset, or what each choice in its training is worth.
+    """Measure a network, methods that choose where to grasp, or what a choice in training is worth.
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
 
     experiment: tyro.conf.OmitSubcommandPrefixes[
         Annotated[Network, tyro.conf.subcommand("network")]
+        | Annotated[Grasp, tyro.conf.subcommand("grasp")]
         | Annotated[Ablations, tyro.conf.subcommand("ablations")]
     ]
 

@@ -4,3 +4,7 @@ from pathlib import Path
 
 DEFORMERNET = Path(__file__).with_name("deformernet.safetensors")
 """DeformerNet, trained on 150 pairs of initial configuration and manipulation point."""
+REGRESSOR = DEFORMERNET.with_name("grasp.safetensors")
+"""Where to grasp, as a position."""
+DENSE = DEFORMERNET.with_name("dense.safetensors")
+"""Where to grasp, as a score for each point."""

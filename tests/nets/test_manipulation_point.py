@@ -1,0 +1,102 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+
+from dnet.errors import BadCloud, ShortCloud
+from dnet.nets.deformernet import DeformerNetConfig, prepare
+from dnet.nets.manipulation_point import (
+    DensePredictor,
+    PointRegressor,
+    middle,
+    most_likely,
+    propagate,
+)
+from dnet.nets.neighbourhoods import Neighbourhoods, stack
+from dnet.nets.pointconv import Norm
+from dnet.types import Cloud
+
+CONFIG = DeformerNetConfig(points=160)
+KINDS = (PointRegressor, DensePredictor)
+
+
+def cloud(seed: int) -> Cloud:
+    return np.random.default_rng(seed).uniform(-0.05, 0.05, (160, 3)).astype(np.float32)
+
+
+def batch(*seeds: int) -> Neighbourhoods:
+    return stack([prepare(cloud(seed), CONFIG) for seed in seeds])
+
+
+def network(kind: Callable[..., torch.nn.Module], norm: Norm = "group") -> torch.nn.Module:
+    torch.manual_seed(0)
+    return kind(DeformerNetConfig(points=160, norm=norm)).eval()
+
+
+@pytest.mark.parametrize("norm", ["group", "batch"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_goals_of_one_batch_are_answered_as_if_alone(
+    kind: Callable[..., torch.nn.Module], norm: Norm
+) -> None:
+    model = network(kind, norm)
+    together = model(batch(0, 1), batch(2, 3, 4), torch.tensor([0, 1, 0]))
+    for row, (initial, goal) in enumerate([(0, 2), (1, 3), (0, 4)]):
+        alone = model(batch(initial), batch(goal), torch.tensor([0]))
+        torch.testing.assert_close(together[row], alone[0], rtol=1e-4, atol=1e-5)
+
+
+def test_scores_are_logarithms_of_probabilities_of_the_first_points() -> None:
+    model = network(DensePredictor)
+    every = model(batch(0), batch(1, 2), torch.tensor([0, 0]))
+    some = model(batch(0), batch(1, 2), torch.tensor([0, 0]), count=50)
+    for scores, count in ((every, 160), (some, 50)):
+        assert scores.shape == (2, count)
+        torch.testing.assert_close(scores.exp().sum(dim=1), torch.ones(2))
+
+
+def test_the_choice_of_a_dense_predictor_is_a_point_of_the_cloud() -> None:
+    chosen = DensePredictor(CONFIG).eval().choose(cloud(0), cloud(1))
+    assert np.linalg.norm(cloud(0) - chosen.point, axis=1).min() < 1e-7
+    assert chosen.probabilities is not None
+    assert chosen.probabilities.sum() == pytest.approx(1, abs=1e-5)
+
+
+def test_a_regressor_without_a_head_chooses_the_middle() -> None:
+    model = PointRegressor(CONFIG).eval()
+    torch.nn.init.zeros_(model.head.output.weight)
+    torch.nn.init.zeros_(model.head.output.bias)
+    chosen = model.choose(cloud(0), cloud(1))
+    np.testing.assert_allclose(chosen.point, cloud(0).mean(axis=0), atol=1e-6)
+    torch.testing.assert_close(
+        middle(batch(0, 1), CONFIG)[1], torch.from_numpy(cloud(1).mean(axis=0)), atol=1e-6, rtol=0
+    )
+
+
+def test_a_crowd_of_likely_points_beats_a_lonely_one() -> None:
+    points = torch.tensor([[[0.0, 0, 0], [0.001, 0, 0], [0.002, 0, 0], [0.1, 0, 0]]])
+    scores = torch.tensor([[0.2, 0.25, 0.2, 0.35]]).log()
+    torch.testing.assert_close(most_likely(scores, points)[0], points[0, 1])
+
+
+def test_values_are_propagated_exactly_to_the_places_and_evenly_between() -> None:
+    places = torch.tensor([[[0.0, 0, 0], [1, 0, 0], [0, 5, 0], [0, -6, 0]]])
+    values = torch.tensor([[[1.0], [3.0], [7.0], [9.0]]])
+    points = torch.tensor([[[0.0, 0, 0], [1, 0, 0], [0.5, 0, 0]]])
+    found = propagate(points, places, values)[0, :, 0]
+    torch.testing.assert_close(found[:2], torch.tensor([1.0, 3.0]), atol=1e-4, rtol=0)
+    near = 1 / 0.5
+    far = 1 / (0.25 + 25) ** 0.5
+    want = (near * 1 + near * 3 + far * 7) / (2 * near + far)
+    torch.testing.assert_close(found[2], torch.tensor(want), atol=1e-4, rtol=0)
+
+
+@pytest.mark.parametrize("kind", [PointRegressor, DensePredictor])
+def test_bad_clouds_are_refused(kind: type[PointRegressor | DensePredictor]) -> None:
+    model = kind(CONFIG).eval()
+    with pytest.raises(ShortCloud, match="has 20 points, need at least 160"):
+        model.choose(cloud(0), cloud(1)[:20])
+    bad = cloud(0)
+    bad[3] = np.nan
+    with pytest.raises(BadCloud, match="initial cloud has 1 of 160"):
+        model.choose(bad, cloud(1))
