@@ -1,7 +1,5 @@
 """How a training went as one Rerun recording: its curves, its motions and its worst pairs."""
 
-import hashlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
+from dnet.recorders.recording_file import recording_file
 from dnet.recorders.rerun_scene import CURRENT_COLOR, GOAL_COLOR, POINT_COLOR, POINT_RADIUS
 from dnet.recorders.training_curves import Curves
 from dnet.recorders.training_layout import SUMMARY, WORST, training_layout
@@ -41,9 +40,8 @@ def write_training(
 ) -> None:
     """Write how a training went so far as the Rerun recording `path`, in place of an older one.
 
-    It is written as `path` + ".part" and renamed, so that whoever opens `path` finds a whole
-    recording. The same training at the same place always has the same recording id: a viewer that
-    opens it again after an epoch adds what is new. Values that are not finite leave gaps.
+    A viewer that opens it again after an epoch adds what is new. Values that are not finite leave
+    gaps.
 
     Args:
         path: Where the recording goes, an `.rrd`.
@@ -55,40 +53,21 @@ def write_training(
         worst: Pairs with the largest errors now, the worst first; the layout shows four.
     """
     colors = _colors(epochs, motions)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    recording = rr.RecordingStream(
-        TRAINING_APPLICATION,
-        recording_id=hashlib.sha256(f"{name}\n{path.resolve()}".encode()).hexdigest()[:32],
-        # They would tell when the file was written.
-        send_properties=False,
-    )
-    recording.set_log_time_enabled(False)
-    try:
-        try:
-            sets = max(2, len(epochs[-1].errors) if epochs else 0)
-            recording.save(part, default_blueprint=training_layout(sets))
-            recording.send_recording_name(name)
-            curves = Curves(recording)
-            curves.send_losses(losses)
-            curves.send_rates(rates)
-            curves.send_errors(epochs, colors)
-            table = _table(epochs[-1]) if epochs else "No epoch is done yet."
-            document = rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN)
-            recording.log(SUMMARY, document, static=True)
-            if motions:
-                log_scatters(recording, motions, colors)
-            for number, sample in enumerate(worst):
-                _log_sample(recording, f"{WORST}/{number}", sample)
-        finally:
-            recording.flush()
-            recording.disconnect()
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    layout = training_layout(max(2, len(epochs[-1].errors) if epochs else 0))
+    with recording_file(
+        path, application=TRAINING_APPLICATION, name=name, blueprint=layout
+    ) as recording:
+        curves = Curves(recording)
+        curves.send_losses(losses)
+        curves.send_rates(rates)
+        curves.send_errors(epochs, colors)
+        table = _table(epochs[-1]) if epochs else "No epoch is done yet."
+        document = rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN)
+        recording.log(SUMMARY, document, static=True)
+        if motions:
+            log_scatters(recording, motions, colors)
+        for number, sample in enumerate(worst):
+            _log_sample(recording, f"{WORST}/{number}", sample)
 
 
 def _colors(

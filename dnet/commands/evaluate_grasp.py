@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from dnet.evaluation.grasp import Answers, Case
+    from dnet.recorders.grasp_recording import GraspCase
     from dnet.servo.pickers import Picker
 
 
@@ -22,7 +23,8 @@ class Grasp:
     A case is the rest shape of an episode and one of its other shapes; the truth is the point at
     which it was grasped. Two baselines stand beside the methods: any point of the surface, and
     the one that is farthest from the goal cloud. OUT gets grasp.md, grasp.csv with every case,
-    and grasp.png with the best, the median and the worst case of each method.
+    grasp.png with the best, the median and the worst case of each method, and grasp.rrd with all
+    of them (`dnet play OUT/grasp.rrd`).
 
     Example: dnet evaluate grasp --from-mcap data/paper --out grasp
     """
@@ -101,6 +103,7 @@ class Grasp:
     ) -> None:
         from dnet.evaluation.grasp import frame_of
         from dnet.evaluation.grasp_figure import draw_cases
+        from dnet.recorders.grasp_recording import write_grasps
 
         out.mkdir(parents=True, exist_ok=True)
         for name, text in (("grasp.md", table), ("grasp.csv", frame_of(cases, answers))):
@@ -108,3 +111,18 @@ class Grasp:
             part.write_text(text, encoding="utf-8")
             part.replace(out / name)
         draw_cases(cases, answers, out / "grasp.png")
+        views = [self._view(number, case, answers) for number, case in enumerate(cases)]
+        write_grasps(out / "grasp.rrd", views)
+
+    def _view(self, number: int, case: "Case", answers: "dict[str, Answers]") -> "GraspCase":
+        from dnet.recorders.grasp_recording import GraspCase
+
+        choice = answers["dense"].choices[number]
+        return GraspCase(
+            case.name,
+            case.initial,
+            case.goal,
+            {name: found.points[number] for name, found in answers.items()},
+            case.truth,
+            None if choice is None else choice.scores,
+        )

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from dnet.types import Place
 
 
-RECORDINGS = ("run.rrd", "training.rrd")
-"""What the directories of `dnet servo` and `dnet train` hold for the viewer."""
+RECORDINGS = ("run.rrd", "training.rrd", "grasp.rrd")
+"""What the directories of `dnet servo`, `train` and `evaluate grasp` hold for the viewer."""
 
 
 @dataclass(frozen=True)

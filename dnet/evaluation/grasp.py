@@ -11,7 +11,7 @@ from jaxtyping import Float64
 from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable
 from dnet.errors import NoDisplacement, TooFew
-from dnet.servo.pickers import Picker
+from dnet.servo.pickers import Choice, Picker
 from dnet.types import Cloud, Point
 
 
@@ -33,6 +33,8 @@ class Answers:
 
     points: Float64[np.ndarray, "n 3"]
     """In metres; NaN where it gave no answer."""
+    choices: tuple[Choice | None, ...]
+    """What lies behind them."""
     distances: Float64[np.ndarray, " n"]
     """From the truth, in metres; of a case without an answer, from the middle of the object: it
     is counted, not dropped."""
@@ -94,20 +96,26 @@ def answers_of(
     """
     points = np.full((len(cases), 3), np.nan)
     confidences, seconds = np.zeros(len(cases)), np.zeros(len(cases))
+    choices: list[Choice | None] = []
     for number, case in enumerate(cases):
         began = perf_counter()
-        try:
-            choice = picker.pick(case.initial, case.goal)
-        except NoDisplacement:
-            pass
-        else:
-            points[number], confidences[number] = choice.point, choice.confidence
+        choice = _choice(picker, case)
         seconds[number] = perf_counter() - began
+        choices.append(choice)
+        if choice is not None:
+            points[number], confidences[number] = choice.point, choice.confidence
         on_case()
     truths = np.stack([case.truth for case in cases])
     middles = np.stack([case.initial.mean(axis=0, dtype=np.float64) for case in cases])
     distances = np.linalg.norm(np.where(np.isnan(points), middles, points) - truths, axis=1)
-    return Answers(points, distances, confidences, seconds)
+    return Answers(points, tuple(choices), distances, confidences, seconds)
+
+
+def _choice(picker: Picker, case: Case) -> Choice | None:
+    try:
+        return picker.pick(case.initial, case.goal)
+    except NoDisplacement:
+        return None
 
 
 def frame_of(cases: Sequence[Case], answers: Mapping[str, Answers]) -> str:

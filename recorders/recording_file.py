@@ -1,0 +1,51 @@
+"""A Rerun recording that is made at once, and takes the place of an older one when it is whole."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+
+@contextmanager
+def recording_file(
+    path: Path, *, application: str, name: str, blueprint: rrb.Blueprint
+) -> Iterator[rr.RecordingStream]:
+    """Give a recording to log to, which is then found at `path`; of an exception, nothing stays.
+
+    It is written as `path` + ".part" and renamed, so that whoever opens `path` finds a whole
+    recording. The same name at the same place always has the same recording id: a viewer that
+    opens it again adds what is new.
+
+    Args:
+        path: Where the recording goes, an `.rrd`.
+        application: Of which all recordings are shown in one layout.
+        name: What the viewer calls it.
+        blueprint: The layout.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    recording = rr.RecordingStream(
+        application,
+        recording_id=hashlib.sha256(f"{name}\n{path.resolve()}".encode()).hexdigest()[:32],
+        # They would tell when the file was written.
+        send_properties=False,
+    )
+    recording.set_log_time_enabled(False)
+    try:
+        try:
+            recording.save(part, default_blueprint=blueprint)
+            recording.send_recording_name(name)
+            yield recording
+        finally:
+            recording.flush()
+            recording.disconnect()
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
