@@ -106,7 +106,7 @@ class Ablations:
 
 @dataclass(frozen=True)
 class Network:
-    """Judge a trained network on all pairs of a dataset's settled frames.
+    """Judge a trained network, whatever its kind, on all pairs of a dataset's settled frames.
 
     The dataset may be any: other objects, another world, other people's clouds.
 
@@ -116,8 +116,8 @@ class Network:
     from_mcap: Annotated[str | Path, tyro.conf.arg(metavar="DIRECTORY|URL")]
     """Episodes."""
     checkpoint: Path | None = None
-    """Directory of `dnet train`, or one of its .safetensors files; the network that ships, unless
-    given."""
+    """Directory of `dnet train`, or one of its .safetensors files; the DeformerNet that ships,
+    unless given."""
     json: tyro.conf.FlagCreatePairsOff[bool] = False
     """Print JSON instead of a table."""
 
@@ -132,17 +132,19 @@ class Network:
 
         from rich.console import Console
 
-        import dnet
         from dnet.commands.index_bar import read_index
         from dnet.commands.progress import progress
         from dnet.commands.training_screen import error_table
         from dnet.datasets.frame_table import settled_frames
         from dnet.datasets.stores import as_place
+        from dnet.training.checkpoints import load_any
         from dnet.training.frames import Frames
-        from dnet.training.scores import errors_of
+        from dnet.training.tasks import task_of
+        from dnet.weights import DEFORMERNET
 
         console = Console(stderr=True)
-        model = dnet.load(self.checkpoint)
+        model = load_any(self.checkpoint or DEFORMERNET)
+        judged_by = task_of(model)
         table = settled_frames(read_index(as_place(self.from_mcap), console))
         name = str(self.from_mcap).rstrip("/").rsplit("/", 1)[-1]
         frames = Frames.of(table, model.config)
@@ -150,11 +152,11 @@ class Network:
             task = bar.add_task("finding neighbours", total=len(table))
             frames.tables.build(on_clouds=lambda done: bar.advance(task, done))
             task = bar.add_task("judging", total=len(table))
-            errors = errors_of(model, frames, on_clouds=lambda done: bar.advance(task, done))
+            errors = judged_by.judge(model, frames, on_clouds=lambda done: bar.advance(task, done))
         if self.json:
             print(dumps(None if errors is None else asdict(errors), indent=2))
         else:
-            Console().print(error_table({name: errors}, title="errors"))
+            Console().print(error_table({name: errors}, title="errors", zero=judged_by.zero))
 
 
 @dataclass(frozen=True)

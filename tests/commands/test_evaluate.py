@@ -1,11 +1,13 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from dnet.commands.evaluate import Ablations, Evaluate, Network
+from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.train import Train
-from dnet.errors import UnknownAblation
+from dnet.errors import BadCheckpoint, UnknownAblation, UnusedOption
 from tests.training.deforming_box import BoxEpisode, write_boxes
 
 
@@ -55,3 +57,47 @@ def test_a_network_is_judged_on_all_pairs_of_any_dataset(
     assert errors["from_rest"]["pairs"] == 5
     Evaluate(Network(other, tmp_path / "run")).run()
     assert f"{errors['any_pair']['mse_mm2']:.2f}" in capsys.readouterr().out
+
+
+def test_methods_of_grasping_are_trained_and_compared_with_the_truth(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for model in ("grasp", "dense"):
+        Train(data, tmp_path / model, model=model, epochs=2, device="cpu", validation=0.3).run()
+        card = (tmp_path / model / "MODEL_CARD.md").read_text()
+        assert "rest to shape" in card
+        assert "any two" not in card
+        assert "the middle" in capsys.readouterr().out
+        assert (tmp_path / model / "training.rrd").exists()
+        Evaluate(Network(data, tmp_path / model, json=True)).run()
+        assert json.loads(capsys.readouterr().out)["from_rest"]["pairs"] == 28
+    out = tmp_path / "grasp-report"
+    report = Grasp(
+        data,
+        out,
+        cases=6,
+        validation=1.0,
+        regressor=tmp_path / "grasp",
+        dense=tmp_path / "dense",
+    )
+    Evaluate(report).run()
+    table = (out / "grasp.md").read_text()
+    methods = ("random point", "most displaced point", "regressor", "dense")
+    assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == [f"| {m}" for m in methods]
+    assert len((out / "grasp.csv").read_text().splitlines()) == 1 + 6 * 4
+    assert {path.name for path in out.iterdir()} == {
+        "grasp.md",
+        "grasp.csv",
+        "grasp.png",
+        "grasp.rrd",
+    }
+    assert "random point" in capsys.readouterr().out
+    with pytest.raises(BadCheckpoint, match="holds PointRegressor, not DensePredictor"):
+        replace(report, dense=tmp_path / "grasp").run()
+
+
+def test_pairs_other_than_from_rest_are_no_way_to_learn_where_to_grasp(
+    data: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(UnusedOption, match="--pairs any does nothing without --model deformernet"):
+        Train(data, tmp_path / "run", model="dense", pairs="any").run()
