@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import polars as pl
@@ -40,7 +40,7 @@ class Answers:
     is counted, not dropped."""
     confidences: Float64[np.ndarray, " n"]
     seconds: Float64[np.ndarray, " n"]
-    """Wall time of each choice."""
+    """Processor time of each choice."""
 
     @property
     def unanswered(self) -> int:
@@ -98,9 +98,9 @@ def answers_of(
     confidences, seconds = np.zeros(len(cases)), np.zeros(len(cases))
     choices: list[Choice | None] = []
     for number, case in enumerate(cases):
-        began = perf_counter()
+        began = process_time()
         choice = _choice(picker, case)
-        seconds[number] = perf_counter() - began
+        seconds[number] = process_time() - began
         choices.append(choice)
         if choice is not None:
             points[number], confidences[number] = choice.point, choice.confidence

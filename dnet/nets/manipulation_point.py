@@ -136,27 +136,24 @@ class DensePredictor(nn.Module):
         """
         here, there = _prepared(initial, goal, self.config)
         scores = self(here, there, torch.zeros(1, dtype=torch.int64))
-        points = torch.from_numpy(np.array(initial))[None]
+        points = torch.from_numpy(np.array(initial))
         point = most_likely(scores, points)[0].numpy().astype(np.float64)
         return Chosen(point, scores[0].exp().numpy())
 
 
 def most_likely(
-    scores: Float[Tensor, "p n"], points: Float[Tensor, "p n 3"], *, radius: float = 0.01
+    scores: Float[Tensor, "p n"], points: Float[Tensor, "n 3"], *, radius: float = 0.01
 ) -> Float[Tensor, "p 3"]:
-    """Return the point with the most probability around it, out of those that were scored.
+    """Return the point with the most probability around it, for each goal of one initial cloud.
 
     Args:
         scores: Logarithms of probabilities.
-        points: In metres.
+        points: Of the initial cloud, those that were scored, in metres.
         radius: Of what counts as around it, in metres (a Gaussian's standard deviation).
     """
-    found = []
-    for score, cloud in zip(scores, points, strict=True):
-        distances = torch.cdist(cloud, cloud, compute_mode="donot_use_mm_for_euclid_dist")
-        around = torch.exp(-0.5 * (distances / radius).square()) @ score.exp()
-        found.append(cloud[around.argmax()])
-    return torch.stack(found)
+    distances = torch.cdist(points, points, compute_mode="donot_use_mm_for_euclid_dist")
+    around = scores.exp() @ torch.exp(-0.5 * (distances / radius).square())
+    return points[around.argmax(dim=1)]
 
 
 def propagate(

@@ -84,5 +84,4 @@ def _points(
     answer: Tensor = model(initial, goal, of)
     if isinstance(model, PointRegressor):
         return answer
-    points = initial.points * model.config.coordinate_unit
-    return most_likely(answer, points.expand(count, -1, -1))
+    return most_likely(answer.float(), initial.points[0] * model.config.coordinate_unit)
