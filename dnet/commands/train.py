@@ -54,10 +54,11 @@ class Train:
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
-    weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped")] = None
-    """Begin with the weights of this network instead of random ones: a run, a .safetensors file,
-    or the DeformerNet that ships; of another --model, the encoder alone. Options of the network
-    must be those that it has."""
+    weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped|random")] = None
+    """What to begin with: a run, a .safetensors file, the DeformerNet that `shipped`, or `random`
+    weights. A DeformerNet begins with random ones, unless given; the models that choose where to
+    grasp with what a DeformerNet knows: `grasp` takes its encoder and trains it on, `dense` all
+    of it, as it is. Options of the network must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""
@@ -241,19 +242,26 @@ class Train:
             "versions": {name: version(name) for name in ("deformernet", "torch")},
         }
 
-    def _begun_with(self, weights: str) -> Path:
+    def _begun_with(self) -> Path | None:
+        """Return the file of the network to begin with; None for random weights."""
         from dnet.training.checkpoints import weights_file
         from dnet.weights import DEFORMERNET
 
-        return DEFORMERNET if weights == "shipped" else weights_file(Path(weights))
+        usual = "random" if self.model == "deformernet" else "shipped"
+        match self.weights or usual:
+            case "random":
+                return None
+            case "shipped":
+                return DEFORMERNET
+            case path:
+                return weights_file(Path(path))
 
     def _digest(self) -> str | None:
         """Return what tells the weights to begin with from others; None for random ones."""
         import hashlib
 
-        if self.weights is None:
-            return None
-        return hashlib.sha256(self._begun_with(self.weights).read_bytes()).hexdigest()[:16]
+        begun = self._begun_with()
+        return None if begun is None else hashlib.sha256(begun.read_bytes()).hexdigest()[:16]
 
     def _begin(
         self,
@@ -279,8 +287,9 @@ class Train:
             pin=device.type == "cuda",
         )
         model = task.new(config, seed=self.seed)
-        if self.weights is not None:
-            begin_with(model, self._begun_with(self.weights))
+        begun = self._begun_with()
+        if begun is not None:
+            begin_with(model, begun)
         objective = task.objective(model.to(device))
         seconds = math.inf if self.minutes is None else 60 * self.minutes
         return Training(objective, stream, settings, process=process, seconds=seconds)

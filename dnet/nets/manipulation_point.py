@@ -14,7 +14,14 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dnet.nets.deformernet import DeformerNetConfig, Encoder, Head, centroid, prepare
+from dnet.nets.deformernet import (
+    DeformerNet,
+    DeformerNetConfig,
+    Encoder,
+    Head,
+    centroid,
+    prepare,
+)
 from dnet.nets.neighbourhoods import Neighbourhoods, stack
 from dnet.nets.pointconv import gather, make_norm
 from dnet.types import Cloud, Point
@@ -72,27 +79,42 @@ class PointRegressor(nn.Module):
 class DensePredictor(nn.Module):
     """A score for each point of the initial cloud: how likely it is the manipulation point.
 
-    A point knows its place, what lies around it (features of the three nearest centroids of both
-    levels, weighed by inverse distance: feature propagation of PointNet++, Qi et al. 2017), and
-    how the goal differs from the initial shape as a whole.
+    A trained DeformerNet, which stays as it is, tells by which motion of the grasp the goal was
+    made. Near the manipulation point, which the jaws carry along, that motion takes the surface
+    onto the goal; elsewhere it does not. A point knows how far it then is from the goal, its
+    place, what lies around it (features of the three nearest centroids of both levels, weighed by
+    inverse distance: feature propagation of PointNet++, Qi et al. 2017), and how the goal differs
+    from the initial shape as a whole.
     """
 
     hidden = (128, 64)
+    patch = 16
+    """Nearest points over which the distances from the goal are averaged, too."""
+    goal_points = 1024
+    """Points of the goal that distances are measured to, the first ones."""
 
     def __init__(self, config: DeformerNetConfig | None = None) -> None:
         super().__init__()
-        self.config = config or DeformerNetConfig()
-        norm = self.config.norm
-        self.encoder = Encoder(norm, density=self.config.density)
+        self.guide = DeformerNet(config)
+        self.guide.requires_grad_(False)
+        self.config = self.guide.config
         first, second = self.hidden
         self.place = nn.Linear(3, first)
+        self.carried = nn.Linear(5, first, bias=False)
         self.near = nn.Linear(Encoder.widths[0], first, bias=False)
         self.far = nn.Linear(Encoder.widths[1], first, bias=False)
         self.whole = nn.Linear(2 * Encoder.features, first, bias=False)
+        norm = self.config.norm
         self.first_norm = make_norm(norm, first)
         self.second = nn.Linear(first, second)
         self.second_norm = make_norm(norm, second)
         self.output = nn.Linear(second, 1)
+
+    def train(self, mode: bool = True) -> "DensePredictor":
+        """Train, or not; the guide never does."""
+        super().train(mode)
+        self.guide.eval()
+        return self
 
     def forward(
         self,
@@ -110,21 +132,46 @@ class DensePredictor(nn.Module):
             of: Which of the initial clouds each goal belongs to.
             count: How many points to score, the first ones; all, unless given.
         """
-        seen = self.encoder.levels(initial)
+        with torch.no_grad():
+            seen, there = self.guide.encoder.levels(initial), self.guide.encode(goal)
+            here = seen.whole[of]
+            motion = self.guide.motion(here, there) / self.config.coordinate_unit
         points = initial.points[:, :count]
-        centred = points - initial.points.mean(dim=1, keepdim=True)
-        local = self.place(centred)
+        local = self.place(points - initial.points.mean(dim=1, keepdim=True))
         for layer, (places, features) in zip(
             (self.near, self.far), (seen.first, seen.second), strict=True
         ):
             # The layer commutes with the interpolation, and there are few centroids.
             local = local + propagate(points, places, layer(features))
-        here, there = seen.whole[of], self.encoder(goal)
         whole = self.whole(torch.cat([there - here, here], dim=1))
-        hidden = functional.relu(self.first_norm(local[of] + whole[:, None]))
+        carried = self.carried(self._distances(points, goal.points, of, motion))
+        hidden = functional.relu(self.first_norm(local[of] + whole[:, None] + carried))
         hidden = functional.relu(self.second_norm(self.second(hidden)))
         scores: Tensor = self.output(hidden)[..., 0]
         return functional.log_softmax(scores, dim=1)
+
+    @torch.no_grad()
+    def _distances(
+        self,
+        points: Float[Tensor, "b n 3"],
+        goal: Float[Tensor, "p m 3"],
+        of: Int64[Tensor, " p"],
+        motion: Float[Tensor, "p 3"],
+    ) -> Float[Tensor, "p n 5"]:
+        """Return how far each point, carried along, is from the goal, in centimetres.
+
+        The offset to the nearest point of the goal, its length, and the mean length over the
+        patch about the point.
+        """
+        goal = goal[:, : self.goal_points]
+        moved = points[of] + motion[:, None]
+        nearest = torch.cdist(moved, goal).argmin(dim=2)
+        offsets = (gather(goal, nearest) - moved) * (self.config.coordinate_unit / 0.01)
+        lengths = offsets.norm(dim=2, keepdim=True)
+        size = min(self.patch, points.shape[1])
+        patches = torch.cdist(points, points).topk(size, dim=2, largest=False).indices
+        means = gather(lengths, patches[of])[..., 0].mean(dim=2, keepdim=True)
+        return torch.cat([offsets, lengths, means], dim=2)
 
     @torch.no_grad()
     def choose(self, initial: Cloud, goal: Cloud) -> Chosen:

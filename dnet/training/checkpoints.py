@@ -14,6 +14,7 @@ from torch import Tensor
 
 from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
 from dnet.training.objectives import Network
@@ -117,7 +118,9 @@ def load_any(path: Path) -> Network:
 
 
 def begin_with(model: Network, path: Path) -> None:
-    """Give `model` the weights that `path` holds; of a network of another kind, its encoder.
+    """Give `model` the weights that `path` holds, or what it needs of a DeformerNet's.
+
+    A regressor takes over its encoder, a dense predictor all of it, as its guide.
 
     Args:
         model: An untrained network.
@@ -127,14 +130,21 @@ def begin_with(model: Network, path: Path) -> None:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
     """
     held = load_any(path)
+    alike = type(held) is type(model)
+    if not (alike or isinstance(held, DeformerNet)):
+        found = f"holds {type(held).__name__}, not {type(model).__name__} or DeformerNet"
+        raise BadCheckpoint(path, found, _HINT)
     for name, value in asdict(model.config).items():
-        if (other := getattr(held.config, name)) != value:
+        # Another network may look at more points or fewer.
+        if (other := getattr(held.config, name)) != value and (alike or name != "points"):
             why = f"is of a network with {name} {other}, not {value}"
             raise BadCheckpoint(path, why, "give the options that it was trained with")
-    if type(held) is type(model):
-        model.load_state_dict(held.state_dict())
-    else:
+    if isinstance(held, DeformerNet) and isinstance(model, DensePredictor):
+        model.guide.load_state_dict(held.state_dict())
+    elif isinstance(held, DeformerNet) and isinstance(model, PointRegressor):
         model.encoder.load_state_dict(held.encoder.state_dict())
+    else:
+        model.load_state_dict(held.state_dict())
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
