@@ -100,3 +100,25 @@ def test_bad_clouds_are_refused(kind: type[PointRegressor | DensePredictor]) -> 
     bad[3] = np.nan
     with pytest.raises(BadCloud, match="initial cloud has 1 of 160"):
         model.choose(bad, cloud(1))
+
+
+def test_the_guide_of_a_dense_predictor_never_learns() -> None:
+    model = DensePredictor(CONFIG).train()
+    assert model.training
+    assert not model.guide.training
+    scores = model(batch(0), batch(1), torch.tensor([0]))
+    scores[0, 0].backward()
+    assert all(weights.grad is None for weights in model.guide.parameters())
+    assert all(w.grad is not None for n, w in model.named_parameters() if "guide" not in n)
+
+
+def test_points_that_the_motion_carries_onto_the_goal_are_at_no_distance_from_it() -> None:
+    model = DensePredictor(CONFIG)
+    points = batch(0).points
+    motion = torch.tensor([[0.3, -0.1, 0.2]])
+    on_it = model._distances(points, points + motion[:, None], torch.tensor([0]), motion)
+    assert on_it.abs().max() < 1e-4
+    off = model._distances(points, points + motion[:, None], torch.tensor([0]), 0 * motion)
+    assert off[..., 3].min() > 0
+    offset, length = off[..., :3].norm(dim=2), off[..., 3]
+    torch.testing.assert_close(offset, length)

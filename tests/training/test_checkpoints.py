@@ -15,6 +15,7 @@ from safetensors.torch import save_file
 
 from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
 from dnet.training.checkpoints import begin_with, load, read_metrics, save, write_json
@@ -132,7 +133,7 @@ def test_another_network_is_refused(tmp_path: Path, model: DeformerNet) -> None:
     with pytest.raises(BadCheckpoint, match="holds KeypointNet, not one of DeformerNet, "):
         load(file)
     save_file(model.state_dict(), file)
-    with pytest.raises(BadCheckpoint, match="holds an unnamed network, not DeformerNet"):
+    with pytest.raises(BadCheckpoint, match="holds an unnamed network, not one of"):
         load(file)
 
 
@@ -224,3 +225,22 @@ def test_a_training_begins_with_the_weights_of_a_network_like_it(
     unlike = new_network(replace(SMALL, norm="batch"), seed=1)
     with pytest.raises(BadCheckpoint, match="with norm group, not batch; give the options"):
         begin_with(unlike, saved)
+
+
+def test_networks_that_choose_where_to_grasp_begin_with_what_a_deformernet_knows(
+    model: DeformerNet, saved: Path, tmp_path: Path
+) -> None:
+    more = replace(SMALL, points=200)
+    regressor, dense = PointRegressor(more), DensePredictor(more)
+    for network, part in ((regressor, regressor.encoder), (dense, dense.guide)):
+        begin_with(network, saved)
+        known = (model.encoder if part is regressor.encoder else model).state_dict()
+        assert all(torch.equal(known[name], value) for name, value in part.state_dict().items())
+    save(tmp_path / "dense.safetensors", dense)
+    again = DensePredictor(more)
+    begin_with(again, tmp_path / "dense.safetensors")
+    assert all(
+        torch.equal(dense.state_dict()[name], value) for name, value in again.state_dict().items()
+    )
+    with pytest.raises(BadCheckpoint, match="holds DensePredictor, not PointRegressor or Deform"):
+        begin_with(regressor, tmp_path / "dense.safetensors")
