@@ -9,6 +9,7 @@ import tyro
 
 from dnet.commands.demo import Demo
 from dnet.commands.evaluate import Evaluate
+from dnet.commands.export import Export
 from dnet.commands.inspect import Inspect
 from dnet.commands.play import Play
 from dnet.commands.record import Record
@@ -26,7 +27,7 @@ learn from the logs, and drive the tissue to a goal shape.
 
 `dnet COMMAND --help` teaches each."""
 
-Command = Record | Train | Servo | Play | Inspect | Evaluate | Demo
+Command = Record | Train | Servo | Play | Inspect | Evaluate | Export | Demo
 COMMANDS: dict[str, type[Command]] = {
     "record": Record,
     "train": Train,
@@ -34,6 +35,7 @@ COMMANDS: dict[str, type[Command]] = {
     "play": Play,
     "inspect": Inspect,
     "evaluate": Evaluate,
+    "export": Export,
     "demo": Demo,
 }
 

@@ -336,6 +336,24 @@ class MissingExtra(DnetError, ImportError):
         )
 
 
+class NotOnnx(DnetError, ValueError):
+    """A file to export to by whose name nobody could tell what it is."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(f"output {path} ends in {path.suffix or 'nothing'}, must end in .onnx")
+
+
+class Disagreement(DnetError, ArithmeticError):
+    """An exported network that is not the original."""
+
+    def __init__(self, path: Path, got: float, limit: float) -> None:
+        super().__init__(
+            f"{path} was not written: the exported network differs from the original by {got:.1e} "
+            f"of its largest output, {limit:.0e} is allowed; try another version of onnxruntime, "
+            "or use the checkpoint itself"
+        )
+
+
 class UnknownStore(DnetError, ValueError):
     """A URL of which nobody knows how to write to it."""
 

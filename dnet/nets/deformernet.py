@@ -197,11 +197,9 @@ class DeformerNet(nn.Module):
         return kept.features.to(self._device)
 
     def _features(self, cloud: Cloud, what: str, *, about: Cloud) -> Float[Tensor, "1 256"]:
-        config = self.config
-        if len(cloud) > config.points:
-            cloud = farthest_points(cloud, config.points)
-        prepared = prepare(cloud, config, what=what, centre=centroid(about))
-        return self.encode(stack([prepared]).to(self._device))
+        return self.encode(
+            prepare_seen(cloud, self.config, what=what, about=about).to(self._device)
+        )
 
     @property
     def _device(self) -> torch.device:
@@ -240,6 +238,28 @@ def prepare(
         raise BadCloud(what, bad, len(cloud))
     (points,) = in_unit(cloud[None], config, centres=None if centre is None else centre[None])
     return find_neighbourhoods(points, GROUPINGS[config.size])
+
+
+def prepare_seen(
+    cloud: Cloud, config: DeformerNetConfig, *, what: str, about: Cloud
+) -> Neighbourhoods:
+    """Return a cloud to predict from, as a batch of one, as a network of `config` takes it.
+
+    Of a cloud with more points than the network takes, the farthest from each other are taken.
+
+    Args:
+        cloud: Points in metres in the world frame.
+        config: Of the network.
+        what: Name of the cloud in an error.
+        about: The goal, whose centroid becomes the origin if coordinates are to be centred.
+
+    Raises:
+        ShortCloud: If the cloud has fewer points than the network takes.
+        BadCloud: If a coordinate is NaN or infinite.
+    """
+    if len(cloud) > config.points:
+        cloud = farthest_points(cloud, config.points)
+    return stack([prepare(cloud, config, what=what, centre=centroid(about))])
 
 
 def centroid(cloud: Cloud) -> Point:

@@ -33,7 +33,7 @@ class GroupNorm(nn.Module):
 
     def forward(self, x: Float[Tensor, "b *rows c"]) -> Float[Tensor, "b *rows c"]:
         """Normalise with channels last."""
-        planes = x.reshape(len(x), -1, 1, x.shape[-1]).permute(0, 3, 1, 2)
+        planes = x.reshape(x.shape[0], -1, 1, x.shape[-1]).permute(0, 3, 1, 2)
         planes = functional.group_norm(planes, 1, self.weight, self.bias, self.epsilon)
         return planes.permute(0, 2, 3, 1).reshape(x.shape)
 

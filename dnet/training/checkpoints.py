@@ -40,25 +40,23 @@ def save(path: Path, network: Network, *, metrics: Mapping[str, Any] | None = No
         network: To be written.
         metrics: What is known of it, as JSON, for people.
     """
-    header = {
+    write_tensors(path, network.state_dict(), header_of(network, metrics))
+
+
+def header_of(network: Network, metrics: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return what a file says of the network that it holds, as JSON."""
+    return {
         "network": type(network).__name__,
         "config": asdict(network.config),
         "metrics": dict(metrics or {}),
     }
-    write_tensors(path, network.state_dict(), header)
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> None:
     """Write tensors and a JSON header into the file `path`, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Clones: a network that is trained on goes on changing, and some tensors share memory.
     kept = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        beside.write_bytes(save_tensors(kept, metadata={_KEY: json.dumps(header)}))
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, save_tensors(kept, metadata={_KEY: json.dumps(header)}))
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
@@ -111,7 +109,7 @@ def load_any(path: Path) -> Network:
     name = header.get("network", "an unnamed network")
     if name not in kinds:
         raise BadCheckpoint(file, f"holds {name}, not one of {', '.join(kinds)}", _HINT)
-    network: Network = kinds[name](_config(file, header.get("config")))
+    network: Network = kinds[name](config_of(file, header.get("config")))
     _check_shapes(file, weights, network.state_dict())
     network.load_state_dict(weights)
     return network.eval()
@@ -160,10 +158,15 @@ def read_metrics(path: Path) -> dict[str, Any]:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write `content` into the file `path`, whole or not at all."""
+    write_whole(path, (json.dumps(content, indent=2) + "\n").encode())
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write `content` into the file `path`, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        beside.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        beside.write_bytes(content)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
@@ -195,7 +198,12 @@ def _read(file: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     return header if isinstance(header, dict) else {}, weights
 
 
-def _config(file: Path, fields: Any) -> DeformerNetConfig:
+def config_of(file: Path, fields: Any) -> DeformerNetConfig:
+    """Return the config that the header of a file holds.
+
+    Raises:
+        BadCheckpoint: If it holds none, or one of a network that is not known here.
+    """
     try:
         config = DeformerNetConfig(
             size=fields["size"],
