@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -11,7 +10,6 @@ from jaxtyping import Float32
 from dnet.nets.deformernet import DeformerNet, centroid, prepare
 from dnet.nets.neighbourhoods import stack
 from dnet.nets.onnx_network import OnnxDeformerNet
-from dnet.types import Cloud, Point
 
 LIMIT = 1e-5
 """Share of the largest output by which an exported network may be wrong."""
@@ -35,14 +33,6 @@ class Agreement:
     def worst(self) -> float:
         """The larger of both differences; NaN if either is."""
         return float(np.maximum(self.features, self.motion))
-
-
-class Predicts(Protocol):
-    """Either network."""
-
-    def predict(self, current: Cloud, goal: Cloud) -> Point:
-        """Return a motion."""
-        ...
 
 
 @torch.no_grad()
@@ -72,9 +62,9 @@ def agreement(model: DeformerNet, exported: OnnxDeformerNet) -> Agreement:
     )
 
 
-def seconds_a_prediction(network: Predicts, points: int) -> float:
+def seconds_a_prediction(network: DeformerNet | OnnxDeformerNet) -> float:
     """Return how long a prediction takes for a known goal, the median of a few."""
-    goal, *clouds = random_clouds(1 + _PREDICTIONS, points)
+    goal, *clouds = random_clouds(1 + _PREDICTIONS, network.config.points)
     network.predict(clouds[0], goal)
     seconds = []
     for cloud in clouds:
