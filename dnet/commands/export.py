@@ -47,6 +47,6 @@ class Export:
             f"largest difference on {found.pairs} pairs of random clouds: {found.features:.1e} of "
             f"the features, {found.motion:.1e} of the motions ({LIMIT:.0e} is allowed)"
         )
-        before, now = map(seconds_a_prediction, (model, exported))
+        before, now = seconds_a_prediction(model), seconds_a_prediction(exported)
         print(f"a prediction takes {now * 1e3:.1f} ms, with PyTorch {before * 1e3:.1f} ms")
         print(f"wrote {self.out} ({self.out.stat().st_size / 1e6:.1f} MB)")

@@ -1,6 +1,7 @@
 """An ONNX graph that grows by an operator at a time, with the layers of DeformerNet among them."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from onnx import NodeProto, TensorProto, helper, numpy_helper
@@ -16,7 +17,7 @@ class Graph:
         self.nodes: list[NodeProto] = []
         self.constants: list[TensorProto] = []
 
-    def add(self, operator: str, *inputs: str, **attributes: int | list[int]) -> str:
+    def add(self, operator: str, *inputs: str, **attributes: Any) -> str:
         """Apply an operator and return the name of its output."""
         output = f"{operator}_{len(self.nodes)}"
         self.nodes.append(
@@ -73,7 +74,7 @@ class Graph:
         else:
             centred = self.add("Sub", value, self.mean(value, axes))
             variance = self.mean(self.add("Mul", centred, centred), axes)
-            epsilon = self.constant(np.float32([norm.epsilon]))
+            epsilon = self.constant(np.array([norm.epsilon], np.float32))
             deviation = self.add("Sqrt", self.add("Add", variance, epsilon))
             scale_of_each = self.add("Div", of_channels(norm.weight), deviation)
             scaled = self.add("Mul", centred, scale_of_each)

@@ -120,7 +120,8 @@ def _head(graph: Graph, model: DeformerNet, difference: str) -> str:
         hidden = graph.linear(hidden, linear.weight, linear.bias)
         hidden = graph.norm_and_relu(hidden, norm, axes=(1,))
     output = graph.linear(hidden, model.head.output.weight, model.head.output.bias)
-    return graph.add("Mul", output, graph.constant(np.float32([model.config.motion_unit])))
+    unit = graph.constant(np.array([model.config.motion_unit], np.float32))
+    return graph.add("Mul", output, unit)
 
 
 def _gather(graph: Graph, values: str, rows: str) -> str:
