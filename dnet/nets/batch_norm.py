@@ -101,4 +101,4 @@ class _BatchNormalise(torch.autograd.Function):
 
 
 def _parts(x: Tensor) -> tuple[Tensor, ...]:
-    return x.split(max(1, _NUMBERS // x.shape[1]))
+    return torch.split(x, max(1, _NUMBERS // x.shape[1]))

