@@ -14,6 +14,7 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dnet.geometry.hidden_sides import hidden_sides
 from dnet.nets.deformernet import (
     DeformerNet,
     DeformerNetConfig,
@@ -32,8 +33,11 @@ class Chosen(NamedTuple):
 
     point: Point
     """Where to grasp, in metres."""
-    probabilities: Float32[np.ndarray, " n"] | None
-    """Of each point of the initial cloud that was scored; None of a regressor."""
+    candidates: Float32[np.ndarray, "c 3"] | None = None
+    """Points of the surface that were scored: the initial cloud, and the sides that are hidden
+    from the camera; None of a regressor."""
+    probabilities: Float32[np.ndarray, " c"] | None = None
+    """Of each candidate."""
 
 
 class PointRegressor(nn.Module):
@@ -73,11 +77,14 @@ class PointRegressor(nn.Module):
         """
         here, there = _prepared(initial, goal, self.config)
         point = self(here, there, torch.zeros(1, dtype=torch.int64))[0]
-        return Chosen(point.numpy().astype(np.float64), None)
+        return Chosen(point.numpy().astype(np.float64))
 
 
 class DensePredictor(nn.Module):
-    """A score for each point of the initial cloud: how likely it is the manipulation point.
+    """A score for each point of the surface: how likely it is the manipulation point.
+
+    The surface is the initial cloud and, since arms also grasp sides that the camera does not
+    see, walls from its outline down to the table.
 
     A trained DeformerNet, which stays as it is, tells by which motion of the grasp the goal was
     made. Near the manipulation point, which the jaws carry along, that motion takes the surface
@@ -122,29 +129,28 @@ class DensePredictor(nn.Module):
         goal: Neighbourhoods,
         of: Int64[Tensor, " p"],
         *,
-        count: int | None = None,
-    ) -> Float[Tensor, "p n"]:
-        """Return the score of each point of the initial cloud, the logarithm of a probability.
+        candidates: Float[Tensor, "b c 3"],
+    ) -> Float[Tensor, "p c"]:
+        """Return the score of each candidate, the logarithm of a probability.
 
         Args:
             initial: A batch of clouds at rest.
             goal: A batch of p goals.
             of: Which of the initial clouds each goal belongs to.
-            count: How many points to score, the first ones; all, unless given.
+            candidates: Points of the surface of each initial cloud, in the network's unit.
         """
         with torch.no_grad():
             seen, there = self.guide.encoder.levels(initial), self.guide.encode(goal)
             here = seen.whole[of]
             motion = self.guide.motion(here, there) / self.config.coordinate_unit
-        points = initial.points[:, :count]
-        local = self.place(points - initial.points.mean(dim=1, keepdim=True))
+        local = self.place(candidates - initial.points.mean(dim=1, keepdim=True))
         for layer, (places, features) in zip(
             (self.near, self.far), (seen.first, seen.second), strict=True
         ):
             # The layer commutes with the interpolation, and there are few centroids.
-            local = local + propagate(points, places, layer(features))
+            local = local + propagate(candidates, places, layer(features))
         whole = self.whole(torch.cat([there - here, here], dim=1))
-        carried = self.carried(self._distances(points, goal.points, of, motion))
+        carried = self.carried(self._distances(candidates, goal.points, of, motion))
         hidden = functional.relu(self.first_norm(local[of] + whole[:, None] + carried))
         hidden = functional.relu(self.second_norm(self.second(hidden)))
         scores: Tensor = self.output(hidden)[..., 0]
@@ -175,17 +181,25 @@ class DensePredictor(nn.Module):
 
     @torch.no_grad()
     def choose(self, initial: Cloud, goal: Cloud) -> Chosen:
-        """Return which point of the initial cloud to grasp, and how likely each of them is.
+        """Return which point of the surface to grasp, and how likely each of them is.
 
         Raises:
             ShortCloud, LongCloud: If a cloud has not the number of points that the network takes.
             BadCloud: If a coordinate is NaN or infinite.
         """
         here, there = _prepared(initial, goal, self.config)
-        scores = self(here, there, torch.zeros(1, dtype=torch.int64))
-        points = torch.from_numpy(np.array(initial))
-        point = most_likely(scores, points)[0].numpy().astype(np.float64)
-        return Chosen(point, scores[0].exp().numpy())
+        candidates = surface(here)
+        scores = self(here, there, torch.zeros(1, dtype=torch.int64), candidates=candidates)
+        places = torch.from_numpy(np.concatenate([initial, hidden_sides(initial)]))
+        point = most_likely(scores, places)[0].numpy().astype(np.float64)
+        return Chosen(point, places.numpy(), scores[0].exp().numpy())
+
+
+def surface(clouds: Neighbourhoods, count: int | None = None) -> Float[Tensor, "b c 3"]:
+    """Return points of the surface of each cloud: its first `count`, or all, and hidden sides."""
+    sides = [torch.from_numpy(hidden_sides(points)) for points in clouds.points.cpu().numpy()]
+    seen = clouds.points[:, :count]
+    return torch.cat([seen, torch.stack(sides).to(seen)], dim=1)
 
 
 def most_likely(
@@ -195,7 +209,7 @@ def most_likely(
 
     Args:
         scores: Logarithms of probabilities.
-        points: Of the initial cloud, those that were scored, in metres.
+        points: The candidates, in metres.
         radius: Of what counts as around it, in metres (a Gaussian's standard deviation).
     """
     distances = torch.cdist(points, points, compute_mode="donot_use_mm_for_euclid_dist")

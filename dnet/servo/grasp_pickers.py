@@ -7,6 +7,7 @@ import numpy as np
 
 from dnet.errors import NoDisplacement
 from dnet.geometry.chamfer import chamfer, nearest_distances
+from dnet.geometry.hidden_sides import hidden_sides
 from dnet.nets.manipulation_point import Chosen
 from dnet.servo.pickers import Choice
 from dnet.types import Cloud, Point
@@ -31,8 +32,9 @@ class Chooser(Protocol):
 class NetworkPicker:
     """Grasps the point of the surface that is nearest to a network's choice.
 
-    Its confidence is, of a network that gives probabilities, the probability within `2 * NEAR` of
-    the choice; of a regressor, exp(-d / NEAR), where its answer lies d off the surface.
+    The surface is the initial cloud, and the sides that are hidden from the camera. Its
+    confidence is, of a network that gives probabilities, the probability within `2 * NEAR` of the
+    choice; of a regressor, exp(-d / NEAR), where its answer lies d off the surface.
     """
 
     network: Chooser
@@ -47,13 +49,14 @@ class NetworkPicker:
         """
         refuse_no_displacement(initial, goal)
         chosen = self.network.choose(initial, goal)
-        distances = np.linalg.norm(initial - chosen.point, axis=1)
-        point = initial[distances.argmin()].astype(np.float64)
-        if chosen.probabilities is None:
+        surface = np.concatenate([initial, hidden_sides(initial)])
+        distances = np.linalg.norm(surface - chosen.point, axis=1)
+        point = _point(surface, int(distances.argmin()))
+        if chosen.candidates is None or chosen.probabilities is None:
             return Choice(point, float(np.exp(-distances.min() / NEAR)))
-        about = np.linalg.norm(initial - point, axis=1) < 2 * NEAR
         scores = chosen.probabilities.astype(np.float64)
-        return Choice(point, min(1.0, float(scores[about].sum())), scores)
+        about = np.linalg.norm(chosen.candidates - point, axis=1) < 2 * NEAR
+        return Choice(point, min(1.0, float(scores[about].sum())), scores[: len(initial)])
 
 
 @dataclass(frozen=True)

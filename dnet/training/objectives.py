@@ -7,7 +7,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
-from dnet.nets.manipulation_point import DensePredictor, PointRegressor
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor, surface
 from dnet.nets.neighbourhoods import Neighbourhoods
 
 Network = DeformerNet | PointRegressor | DensePredictor
@@ -17,7 +17,8 @@ LABEL_RADIUS = 0.005
 """Standard deviation of the Gaussian about the manipulation point that scores are compared with,
 in metres: about the distance between the points of a cloud that are scored."""
 SCORED = 512
-"""Points of a cloud that are scored in training, its first ones, the farthest from each other."""
+"""Points of a cloud that are scored in training, its first ones, the farthest from each other;
+besides its hidden sides."""
 
 
 class Objective(nn.Module, ABC):
@@ -101,8 +102,9 @@ class HeatMap(Objective):
         """Return the divergence of each pair's scores."""
         rests, of = torch.unique(current, return_inverse=True)
         initial = clouds.take(rests)
-        scores = self.network(initial, clouds.take(goal), of, count=SCORED).float()
-        labels = self._labels(initial.points[:, :SCORED], of, targets)
+        candidates = surface(initial, SCORED)
+        scores = self.network(initial, clouds.take(goal), of, candidates=candidates).float()
+        labels = self._labels(candidates, of, targets)
         return (labels.exp() * (labels - scores)).sum(dim=1)
 
     def _labels(

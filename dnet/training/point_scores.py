@@ -7,7 +7,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from dnet.nets.manipulation_point import DensePredictor, PointRegressor, middle, most_likely
+from dnet.nets.manipulation_point import (
+    DensePredictor,
+    PointRegressor,
+    middle,
+    most_likely,
+    surface,
+)
 from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.frames import Frames, Rows
 from dnet.training.scores import Errors, Tally, Watch
@@ -81,7 +87,9 @@ def _points(
 ) -> Float[Tensor, "p 3"]:
     count = len(goal.points)
     of = torch.zeros(count, dtype=torch.int64, device=goal.points.device)
-    answer: Tensor = model(initial, goal, of)
     if isinstance(model, PointRegressor):
+        answer: Tensor = model(initial, goal, of)
         return answer
-    return most_likely(answer.float(), initial.points[0] * model.config.coordinate_unit)
+    candidates = surface(initial)
+    scores = model(initial, goal, of, candidates=candidates)
+    return most_likely(scores.float(), candidates[0] * model.config.coordinate_unit)
