@@ -11,7 +11,7 @@ SIDE_POINTS = AROUND * HEIGHTS
 """Points of `hidden_sides`."""
 
 
-def hidden_sides(cloud: Cloud) -> Float32[np.ndarray, "{SIDE_POINTS} 3"]:
+def hidden_sides(cloud: Cloud) -> Float32[np.ndarray, "walls 3"]:
     """Return points on vertical walls from the outline of a cloud down to its lowest height.
 
     The outline is the convex hull seen from above, walked in equal steps; each wall is as high as

@@ -1,10 +1,9 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 import torch
 
 from dnet.errors import BadCloud, ShortCloud
+from dnet.geometry.hidden_sides import SIDE_POINTS
 from dnet.nets.deformernet import DeformerNetConfig, prepare
 from dnet.nets.manipulation_point import (
     DensePredictor,
@@ -12,6 +11,7 @@ from dnet.nets.manipulation_point import (
     middle,
     most_likely,
     propagate,
+    surface,
 )
 from dnet.nets.neighbourhoods import Neighbourhoods, stack
 from dnet.nets.pointconv import Norm
@@ -19,6 +19,7 @@ from dnet.types import Cloud
 
 CONFIG = DeformerNetConfig(points=160)
 KINDS = (PointRegressor, DensePredictor)
+Kind = type[PointRegressor | DensePredictor]
 
 
 def cloud(seed: int) -> Cloud:
@@ -29,36 +30,45 @@ def batch(*seeds: int) -> Neighbourhoods:
     return stack([prepare(cloud(seed), CONFIG) for seed in seeds])
 
 
-def network(kind: Callable[..., torch.nn.Module], norm: Norm = "group") -> torch.nn.Module:
+def network(kind: Kind, norm: Norm = "group") -> PointRegressor | DensePredictor:
     torch.manual_seed(0)
     return kind(DeformerNetConfig(points=160, norm=norm)).eval()
 
 
+def answer(
+    model: PointRegressor | DensePredictor,
+    initial: Neighbourhoods,
+    goal: Neighbourhoods,
+    of: list[int],
+) -> torch.Tensor:
+    given = {} if isinstance(model, PointRegressor) else {"candidates": surface(initial, 50)}
+    found: torch.Tensor = model(initial, goal, torch.tensor(of), **given)
+    return found
+
+
 @pytest.mark.parametrize("norm", ["group", "batch"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_goals_of_one_batch_are_answered_as_if_alone(
-    kind: Callable[..., torch.nn.Module], norm: Norm
-) -> None:
+def test_goals_of_one_batch_are_answered_as_if_alone(kind: Kind, norm: Norm) -> None:
     model = network(kind, norm)
-    together = model(batch(0, 1), batch(2, 3, 4), torch.tensor([0, 1, 0]))
+    together = answer(model, batch(0, 1), batch(2, 3, 4), [0, 1, 0])
     for row, (initial, goal) in enumerate([(0, 2), (1, 3), (0, 4)]):
-        alone = model(batch(initial), batch(goal), torch.tensor([0]))
+        alone = answer(model, batch(initial), batch(goal), [0])
         torch.testing.assert_close(together[row], alone[0], rtol=1e-4, atol=1e-5)
 
 
-def test_scores_are_logarithms_of_probabilities_of_the_first_points() -> None:
-    model = network(DensePredictor)
-    every = model(batch(0), batch(1, 2), torch.tensor([0, 0]))
-    some = model(batch(0), batch(1, 2), torch.tensor([0, 0]), count=50)
-    for scores, count in ((every, 160), (some, 50)):
-        assert scores.shape == (2, count)
-        torch.testing.assert_close(scores.exp().sum(dim=1), torch.ones(2))
+def test_scores_are_logarithms_of_probabilities() -> None:
+    scores = answer(network(DensePredictor), batch(0), batch(1, 2), [0, 0])
+    assert scores.shape == (2, 50 + SIDE_POINTS)
+    torch.testing.assert_close(scores.exp().sum(dim=1), torch.ones(2))
 
 
-def test_the_choice_of_a_dense_predictor_is_a_point_of_the_cloud() -> None:
+def test_the_choice_of_a_dense_predictor_is_a_candidate() -> None:
     chosen = DensePredictor(CONFIG).eval().choose(cloud(0), cloud(1))
-    assert np.linalg.norm(cloud(0) - chosen.point, axis=1).min() < 1e-7
+    assert chosen.candidates is not None
     assert chosen.probabilities is not None
+    np.testing.assert_array_equal(chosen.candidates[:160], cloud(0))
+    assert np.linalg.norm(chosen.candidates - chosen.point, axis=1).min() < 1e-7
+    assert len(chosen.candidates) == len(chosen.probabilities) == 160 + SIDE_POINTS
     assert chosen.probabilities.sum() == pytest.approx(1, abs=1e-5)
 
 
@@ -91,8 +101,8 @@ def test_values_are_propagated_exactly_to_the_places_and_evenly_between() -> Non
     torch.testing.assert_close(found[2], torch.tensor(want), atol=1e-4, rtol=0)
 
 
-@pytest.mark.parametrize("kind", [PointRegressor, DensePredictor])
-def test_bad_clouds_are_refused(kind: type[PointRegressor | DensePredictor]) -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_bad_clouds_are_refused(kind: Kind) -> None:
     model = kind(CONFIG).eval()
     with pytest.raises(ShortCloud, match="has 20 points, need at least 160"):
         model.choose(cloud(0), cloud(1)[:20])
@@ -106,8 +116,7 @@ def test_the_guide_of_a_dense_predictor_never_learns() -> None:
     model = DensePredictor(CONFIG).train()
     assert model.training
     assert not model.guide.training
-    scores = model(batch(0), batch(1), torch.tensor([0]))
-    scores[0, 0].backward()
+    torch.autograd.backward(answer(model, batch(0), batch(1), [0])[0, 0])
     assert all(weights.grad is None for weights in model.guide.parameters())
     assert all(w.grad is not None for n, w in model.named_parameters() if "guide" not in n)
 

@@ -28,7 +28,9 @@ class Said:
     probabilities: Float32[np.ndarray, " n"] | None = None
 
     def choose(self, initial: Cloud, goal: Cloud) -> Chosen:
-        return Chosen(self.point, self.probabilities)
+        if self.probabilities is None:
+            return Chosen(self.point)
+        return Chosen(self.point, initial, self.probabilities)
 
 
 def test_a_choice_off_the_surface_is_brought_to_it_and_trusted_less() -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from dnet.nets.manipulation_point import DensePredictor, PointRegressor
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor, surface
 from dnet.training.examples import Examples, stream_of
 from dnet.training.frames import Frames
 from dnet.training.objectives import HeatMap, MotionError, Objective, PointError
@@ -74,10 +74,11 @@ def test_a_heat_map_is_right_where_it_is_the_gaussian_about_the_truth(frames: Fr
     found = losses(objective, examples)
     assert (found > 0).all()
     rests, of = torch.unique(examples.current, return_inverse=True)
-    labels = objective._labels(examples.clouds.take(rests).points, of, examples.targets)
+    candidates = surface(examples.clouds.take(rests), 100)
+    labels = objective._labels(candidates, of, examples.targets)
     torch.testing.assert_close(labels.exp().sum(dim=1), torch.ones(len(labels)))
     unit = SMALL.coordinate_unit
-    places = examples.clouds.take(rests).points[of] * unit
+    places = candidates[of] * unit
     nearest = (places - examples.targets[:, None]).norm(dim=2).argmin(dim=1)
     assert torch.equal(labels.argmax(dim=1), nearest)
 
