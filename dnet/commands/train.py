@@ -57,8 +57,8 @@ class Train:
     weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped|random")] = None
     """What to begin with: a run, a .safetensors file, the DeformerNet that `shipped`, or `random`
     weights. A DeformerNet begins with random ones, unless given; the models that choose where to
-    grasp with what a DeformerNet knows: `grasp` takes its encoder and trains it on, `dense` all
-    of it, as it is. Options of the network must be those that it has."""
+    grasp with what a DeformerNet knows: `grasp` takes its encoder, `dense` all of it, and both
+    train it on. Options of the network must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""

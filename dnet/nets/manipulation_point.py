@@ -40,6 +40,15 @@ class Chosen(NamedTuple):
     """Of each candidate."""
 
 
+class Scored(NamedTuple):
+    """What a dense predictor makes of a batch."""
+
+    scores: Float[Tensor, "p c"]
+    """Of each candidate, the logarithm of its probability."""
+    motion: Float[Tensor, "p 3"]
+    """Of the grasp, from the initial shape to the goal, in metres."""
+
+
 class PointRegressor(nn.Module):
     """DeformerNet with a position as its output.
 
@@ -86,24 +95,23 @@ class DensePredictor(nn.Module):
     The surface is the initial cloud and, since arms also grasp sides that the camera does not
     see, walls from its outline down to the table.
 
-    A trained DeformerNet, which stays as it is, tells by which motion of the grasp the goal was
-    made. Near the manipulation point, which the jaws carry along, that motion takes the surface
-    onto the goal; elsewhere it does not. A point knows how far it then is from the goal, its
-    place, what lies around it (features of the three nearest centroids of both levels, weighed by
-    inverse distance: feature propagation of PointNet++, Qi et al. 2017), and how the goal differs
-    from the initial shape as a whole.
+    A DeformerNet within tells by which motion of the grasp the goal was made, and is trained to,
+    along with the scores. Near the manipulation point, which the jaws carry along, that motion
+    takes the surface onto the goal; elsewhere it does not. A point knows how far it then is from
+    the goal, its place, what lies around it (features of the three nearest centroids of both
+    levels, weighed by inverse distance: feature propagation of PointNet++, Qi et al. 2017), and
+    how the goal differs from the initial shape as a whole.
     """
 
     hidden = (128, 64)
     patch = 16
     """Nearest points over which the distances from the goal are averaged, too."""
-    goal_points = 1024
+    goal_points = 768
     """Points of the goal that distances are measured to, the first ones."""
 
     def __init__(self, config: DeformerNetConfig | None = None) -> None:
         super().__init__()
         self.guide = DeformerNet(config)
-        self.guide.requires_grad_(False)
         self.config = self.guide.config
         first, second = self.hidden
         self.place = nn.Linear(3, first)
@@ -117,12 +125,6 @@ class DensePredictor(nn.Module):
         self.second_norm = make_norm(norm, second)
         self.output = nn.Linear(second, 1)
 
-    def train(self, mode: bool = True) -> "DensePredictor":
-        """Train, or not; the guide never does."""
-        super().train(mode)
-        self.guide.eval()
-        return self
-
     def forward(
         self,
         initial: Neighbourhoods,
@@ -130,8 +132,8 @@ class DensePredictor(nn.Module):
         of: Int64[Tensor, " p"],
         *,
         candidates: Float[Tensor, "b c 3"],
-    ) -> Float[Tensor, "p c"]:
-        """Return the score of each candidate, the logarithm of a probability.
+    ) -> Scored:
+        """Return how likely each candidate is, and the motion that leads to the goal.
 
         Args:
             initial: A batch of clouds at rest.
@@ -139,10 +141,9 @@ class DensePredictor(nn.Module):
             of: Which of the initial clouds each goal belongs to.
             candidates: Points of the surface of each initial cloud, in the network's unit.
         """
-        with torch.no_grad():
-            seen, there = self.guide.encoder.levels(initial), self.guide.encode(goal)
-            here = seen.whole[of]
-            motion = self.guide.motion(here, there) / self.config.coordinate_unit
+        seen, there = self.guide.encoder.levels(initial), self.guide.encode(goal)
+        here = seen.whole[of]
+        motion = self.guide.motion(here, there)
         local = self.place(candidates - initial.points.mean(dim=1, keepdim=True))
         for layer, (places, features) in zip(
             (self.near, self.far), (seen.first, seen.second), strict=True
@@ -150,11 +151,12 @@ class DensePredictor(nn.Module):
             # The layer commutes with the interpolation, and there are few centroids.
             local = local + propagate(candidates, places, layer(features))
         whole = self.whole(torch.cat([there - here, here], dim=1))
-        carried = self.carried(self._distances(candidates, goal.points, of, motion))
+        way = motion.detach() / self.config.coordinate_unit
+        carried = self.carried(self._distances(candidates, goal.points, of, way))
         hidden = functional.relu(self.first_norm(local[of] + whole[:, None] + carried))
         hidden = functional.relu(self.second_norm(self.second(hidden)))
         scores: Tensor = self.output(hidden)[..., 0]
-        return functional.log_softmax(scores, dim=1)
+        return Scored(functional.log_softmax(scores, dim=1), motion)
 
     @torch.no_grad()
     def _distances(
@@ -189,7 +191,7 @@ class DensePredictor(nn.Module):
         """
         here, there = _prepared(initial, goal, self.config)
         candidates = surface(here)
-        scores = self(here, there, torch.zeros(1, dtype=torch.int64), candidates=candidates)
+        scores = self(here, there, torch.zeros(1, dtype=torch.int64), candidates=candidates).scores
         places = torch.from_numpy(np.concatenate([initial, hidden_sides(initial)]))
         point = most_likely(scores, places)[0].numpy().astype(np.float64)
         return Chosen(point, places.numpy(), scores[0].exp().numpy())

@@ -29,21 +29,22 @@ class Examples:
     """Of each pair: which of the clouds is the current one."""
     goal: Int64[Tensor, " p"]
     """Of each pair: which of the clouds is the goal."""
-    targets: Float32[Tensor, "p 3"]
-    """What a network should answer to each pair, in metres: the motion of the grasp from current
-    to goal, or the manipulation point of the current shape."""
+    motions: Float32[Tensor, "p 3"]
+    """Of the grasp, from current to goal, in metres."""
+    points: Float32[Tensor, "p 3"]
+    """The manipulation point of the current shape of each pair, in metres."""
 
     def to(self, device: torch.device) -> "Examples":
         """Return the same batch on `device`."""
-        current, goal, targets = (
+        current, goal, motions, points = (
             tensor.to(device, non_blocking=True)
-            for tensor in (self.current, self.goal, self.targets)
+            for tensor in (self.current, self.goal, self.motions, self.points)
         )
-        return Examples(self.clouds.to(device), current, goal, targets)
+        return Examples(self.clouds.to(device), current, goal, motions, points)
 
     def pin_memory(self) -> "Examples":
         """Return the batch in memory from which a GPU reads fastest."""
-        pairs = (self.current, self.goal, self.targets)
+        pairs = (self.current, self.goal, self.motions, self.points)
         return Examples(self.clouds.pin_memory(), *(tensor.pin_memory() for tensor in pairs))
 
 
@@ -171,7 +172,6 @@ class AllPairs(Dataset[Examples]):
             rows=chosen.rows,
             groups=chosen.groups,
             pairs=(current, goal),
-            target=self._target,
         )
 
     @property
@@ -222,18 +222,17 @@ def _examples(
     rows: Rows,
     groups: Rows,
     pairs: tuple[Rows, Rows],
-    target: Target = "motion",
 ) -> Examples:
     samplings = frames.tables.samplings
     placement, choices = variation.draw(drawn, groups, samplings=samplings)
     clouds = frames.prepared(rows, choices=choices)
     current, goal = pairs
-    targets = torch.from_numpy(frames.targets(target, rows[current], rows[goal]))
+    motions = torch.from_numpy(frames.motions(rows[current], rows[goal]))
+    points = torch.from_numpy(frames.points(rows[current]))
     if placement is not None:
         of_clouds, of_pairs = torch.from_numpy(groups), torch.from_numpy(groups[current])
         unit = frames.config.coordinate_unit
         clouds = place(clouds, placement, groups=of_clouds, coordinate_unit=unit)
-        targets = turn(targets, placement, groups=of_pairs)
-        if target == "point":
-            targets = targets + placement.shifts[of_pairs]
-    return Examples(clouds, torch.from_numpy(current), torch.from_numpy(goal), targets)
+        motions = turn(motions, placement, groups=of_pairs)
+        points = turn(points, placement, groups=of_pairs) + placement.shifts[of_pairs]
+    return Examples(clouds, torch.from_numpy(current), torch.from_numpy(goal), motions, points)

@@ -56,11 +56,9 @@ class Frames:
         clouds = self.clouds.stack(rows)[:, : self.config.points]
         return self.tables.of(rows, clouds, choices=choices)
 
-    def targets(self, target: Target, current: Rows, goal: Rows) -> Float32[np.ndarray, "p 3"]:
-        """Return what a network should answer to pairs of frames, in metres."""
-        if target == "motion":
-            return self.motions(current, goal)
-        return self.table.grasps[current].astype(np.float32)
+    def points(self, rows: Rows) -> Float32[np.ndarray, "p 3"]:
+        """Return the manipulation point of some frames, in metres."""
+        return self.table.grasps[rows].astype(np.float32)
 
     def motions(self, current: Rows, goal: Rows) -> Float32[np.ndarray, "p 3"]:
         """Return the motion of the grasp between frames, in metres."""

@@ -16,7 +16,7 @@ Network = DeformerNet | PointRegressor | DensePredictor
 LABEL_RADIUS = 0.005
 """Standard deviation of the Gaussian about the manipulation point that scores are compared with,
 in metres: about the distance between the points of a cloud that are scored."""
-SCORED = 512
+SCORED = 256
 """Points of a cloud that are scored in training, its first ones, the farthest from each other;
 besides its hidden sides."""
 
@@ -32,7 +32,12 @@ class Objective(nn.Module, ABC):
 
     @abstractmethod
     def forward(
-        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+        self,
+        clouds: Neighbourhoods,
+        current: Tensor,
+        goal: Tensor,
+        motions: Tensor,
+        points: Tensor,
     ) -> Float[Tensor, " p"]:
         """Return the loss of each pair; near 1 for an untrained network.
 
@@ -40,7 +45,8 @@ class Objective(nn.Module, ABC):
             clouds: A batch.
             current: Of each pair: which of the clouds is the current one.
             goal: Of each pair: which is the goal.
-            targets: Of each pair: the true answer, in metres, (p, 3).
+            motions: Of each pair: the true motion of the grasp, in metres, (p, 3).
+            points: Of each pair: the true manipulation point of the current shape, likewise.
         """
 
 
@@ -55,12 +61,17 @@ class MotionError(Objective):
         self.shown = (1000 * network.config.motion_unit) ** 2
 
     def forward(
-        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+        self,
+        clouds: Neighbourhoods,
+        current: Tensor,
+        goal: Tensor,
+        motions: Tensor,
+        points: Tensor,  # noqa: ARG002
     ) -> Float[Tensor, " p"]:
         """Return the squared error of each pair's motion."""
         features = self.network.encode(clouds)
-        motions = self.network.motion(features[current], features[goal])
-        return _squared(motions, targets, unit=self.config.motion_unit)
+        found = self.network.motion(features[current], features[goal])
+        return _squared(found, motions, unit=self.config.motion_unit)
 
 
 class PointError(Objective):
@@ -74,18 +85,24 @@ class PointError(Objective):
         self.shown = (1000 * network.config.motion_unit) ** 2
 
     def forward(
-        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+        self,
+        clouds: Neighbourhoods,
+        current: Tensor,
+        goal: Tensor,
+        motions: Tensor,  # noqa: ARG002
+        points: Tensor,
     ) -> Float[Tensor, " p"]:
         """Return the squared error of each pair's point."""
         rests, of = torch.unique(current, return_inverse=True)
-        points = self.network(clouds.take(rests), clouds.take(goal), of)
-        return _squared(points, targets, unit=self.config.motion_unit)
+        found = self.network(clouds.take(rests), clouds.take(goal), of)
+        return _squared(found, points, unit=self.config.motion_unit)
 
 
 class HeatMap(Objective):
     """How far a dense predictor's scores are from a Gaussian about the manipulation point.
 
-    The Kullback-Leibler divergence of the one from the other, in nats.
+    The Kullback-Leibler divergence of the one from the other, in nats, and the squared error of
+    the motions that guide it, in its unit.
     """
 
     network: DensePredictor
@@ -97,21 +114,30 @@ class HeatMap(Objective):
         self.network, self.config = network, network.config
 
     def forward(
-        self, clouds: Neighbourhoods, current: Tensor, goal: Tensor, targets: Tensor
+        self,
+        clouds: Neighbourhoods,
+        current: Tensor,
+        goal: Tensor,
+        motions: Tensor,
+        points: Tensor,
     ) -> Float[Tensor, " p"]:
-        """Return the divergence of each pair's scores."""
+        """Return the divergence of each pair's scores, and the error of its motion."""
         rests, of = torch.unique(current, return_inverse=True)
         initial = clouds.take(rests)
         candidates = surface(initial, SCORED)
-        scores = self.network(initial, clouds.take(goal), of, candidates=candidates).float()
-        labels = self._labels(candidates, of, targets)
-        return (labels.exp() * (labels - scores)).sum(dim=1)
+        found = self.network(initial, clouds.take(goal), of, candidates=candidates)
+        labels = self._labels(candidates, of, points)
+        divergence = (labels.exp() * (labels - found.scores.float())).sum(dim=1)
+        return divergence + _squared(found.motion, motions, unit=self.config.motion_unit)
 
     def _labels(
-        self, points: Float[Tensor, "b n 3"], of: Int64[Tensor, " p"], targets: Float[Tensor, "p 3"]
-    ) -> Float[Tensor, "p n"]:
-        places = points[of] * self.config.coordinate_unit
-        squares = (places - targets[:, None]).square().sum(dim=2)
+        self,
+        candidates: Float[Tensor, "b c 3"],
+        of: Int64[Tensor, " p"],
+        points: Float[Tensor, "p 3"],
+    ) -> Float[Tensor, "p c"]:
+        places = candidates[of] * self.config.coordinate_unit
+        squares = (places - points[:, None]).square().sum(dim=2)
         return torch.log_softmax(-squares / (2 * LABEL_RADIUS**2), dim=1)
 
 

@@ -76,7 +76,7 @@ def _judge(
         current = np.full(len(part), rest)
         goal = frames.prepared(part).to(device)
         predicted = _points(model, initial, goal).float().cpu() - centre
-        true = torch.from_numpy(frames.targets("point", current, part)) - centre
+        true = torch.from_numpy(frames.points(current)) - centre
         tally.add(predicted, true)
         if watch is not None:
             watch(current, part, predicted, true)
@@ -91,5 +91,5 @@ def _points(
         answer: Tensor = model(initial, goal, of)
         return answer
     candidates = surface(initial)
-    scores = model(initial, goal, of, candidates=candidates)
+    scores = model(initial, goal, of, candidates=candidates).scores
     return most_likely(scores.float(), candidates[0] * model.config.coordinate_unit)

@@ -128,7 +128,9 @@ class Training:
             group["lr"] = self.settings.rate(self._progress(self.stream.batch - 1), step=self.steps)
         self._optimizer.zero_grad(set_to_none=True)
         with self._precision():
-            losses = self._joined(batch.clouds, batch.current, batch.goal, batch.targets)
+            losses = self._joined(
+                batch.clouds, batch.current, batch.goal, batch.motions, batch.points
+            )
         loss = losses.sum()
         told = (
             len(losses),

@@ -32,7 +32,7 @@ def batches(
 def tensors(batch: Examples) -> list[torch.Tensor]:
     clouds = batch.clouds
     of_clouds = [clouds.points, clouds.centroids, *clouds.neighbours, *clouds.inverse_densities]
-    return [*of_clouds, batch.current, batch.goal, batch.targets]
+    return [*of_clouds, batch.current, batch.goal, batch.motions, batch.points]
 
 
 def same(one: list[Examples], other: list[Examples]) -> bool:
@@ -60,7 +60,7 @@ def test_a_pair_is_two_clouds_of_an_episode_and_the_motion_between(
     for batch in batches(frames, replace(PLAIN, pairs=pairs)):
         rows = [found(frames, cloud) for cloud in batch.clouds.points]
         for current, goal, motion in zip(
-            batch.current.tolist(), batch.goal.tolist(), batch.targets.numpy(), strict=True
+            batch.current.tolist(), batch.goal.tolist(), batch.motions.numpy(), strict=True
         ):
             here, there = rows[current], rows[goal]
             assert here != there
@@ -81,8 +81,8 @@ def test_a_placed_group_is_turned_as_a_whole_and_its_motions_with_it(frames: Fra
     for plain, placed in zip(batches(frames, PLAIN), batches(frames, wide), strict=True):
         assert torch.equal(plain.current, placed.current)
         # Lengths stay, and so do distances between the clouds of a pair.
-        torch.testing.assert_close(plain.targets.norm(dim=1), placed.targets.norm(dim=1))
-        assert not torch.allclose(plain.targets, placed.targets, atol=1e-3)
+        torch.testing.assert_close(plain.motions.norm(dim=1), placed.motions.norm(dim=1))
+        assert not torch.allclose(plain.motions, placed.motions, atol=1e-3)
         for batch in (plain, placed):
             assert batch.clouds.points.isfinite().all()
         apart = [
@@ -117,7 +117,7 @@ def test_processes_share_the_batches_of_one(frames: Frames) -> None:
     for whole, *parts in zip(alone, *shares, strict=True):
         points = torch.cat([part.clouds.points for part in parts])
         assert torch.equal(points, whole.clouds.points)
-        assert torch.equal(torch.cat([part.targets for part in parts]), whole.targets)
+        assert torch.equal(torch.cat([part.motions for part in parts]), whole.motions)
 
 
 def test_a_batch_that_cannot_be_shared_is_refused(frames: Frames) -> None:

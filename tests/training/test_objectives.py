@@ -26,7 +26,7 @@ def batch(frames: Frames, model: Model) -> Examples:
 
 
 def losses(objective: Objective, batch: Examples) -> torch.Tensor:
-    return objective(batch.clouds, batch.current, batch.goal, batch.targets)
+    return objective(batch.clouds, batch.current, batch.goal, batch.motions, batch.points)
 
 
 def test_a_motions_loss_is_its_squared_error(frames: Frames) -> None:
@@ -34,7 +34,7 @@ def test_a_motions_loss_is_its_squared_error(frames: Frames) -> None:
     examples, objective = batch(frames, "deformernet"), MotionError(network)
     features = network.encode(examples.clouds)
     motions = network.motion(features[examples.current], features[examples.goal])
-    squares = (1000 * (motions - examples.targets)).square().mean(dim=1)
+    squares = (1000 * (motions - examples.motions)).square().mean(dim=1)
     torch.testing.assert_close(losses(objective, examples) * objective.shown, squares)
 
 
@@ -45,7 +45,7 @@ def test_points_are_learned_from_rest_to_every_other_shape_of_a_group(frames: Fr
         assert len(rests) == 2
         assert not set(rests.tolist()) & set(examples.goal.tolist())
         for rest in rests.tolist():
-            targets = examples.targets[examples.current == rest]
+            targets = examples.points[examples.current == rest]
             assert (targets == targets[0]).all()
             true = frames.table.grasps[frames.table.rest].astype(np.float32)
             assert (np.abs(true - targets[0].numpy()).max(axis=1) == 0).any()
@@ -59,7 +59,7 @@ def test_a_placed_point_moves_with_its_object(frames: Frames) -> None:
     unit = frames.config.coordinate_unit
     plain = frames.table
     for pair, rest in enumerate(examples.current.tolist()):
-        distances = (examples.clouds.points[rest] * unit - examples.targets[pair]).norm(dim=1)
+        distances = (examples.clouds.points[rest] * unit - examples.points[pair]).norm(dim=1)
         # How far the manipulation point is from each point of its cloud does not change.
         found = [
             np.linalg.norm(frames.clouds[row] - plain.grasps[row], axis=1)
@@ -75,15 +75,15 @@ def test_a_heat_map_is_right_where_it_is_the_gaussian_about_the_truth(frames: Fr
     assert (found > 0).all()
     rests, of = torch.unique(examples.current, return_inverse=True)
     candidates = surface(examples.clouds.take(rests), 100)
-    labels = objective._labels(candidates, of, examples.targets)
+    labels = objective._labels(candidates, of, examples.points)
     torch.testing.assert_close(labels.exp().sum(dim=1), torch.ones(len(labels)))
     unit = SMALL.coordinate_unit
     places = candidates[of] * unit
-    nearest = (places - examples.targets[:, None]).norm(dim=2).argmin(dim=1)
+    nearest = (places - examples.points[:, None]).norm(dim=2).argmin(dim=1)
     assert torch.equal(labels.argmax(dim=1), nearest)
 
 
-@pytest.mark.parametrize(("model", "share"), [("grasp", 0.3), ("dense", 0.6)])
+@pytest.mark.parametrize(("model", "share"), [("grasp", 0.3), ("dense", 0.5)])
 def test_where_to_grasp_is_learned(frames: Frames, model: Model, share: float) -> None:
     task = TASKS[model]
     network = task.new(frames.config, seed=0)
@@ -110,5 +110,5 @@ def test_a_regressors_loss_is_its_squared_error(frames: Frames) -> None:
     examples, objective = batch(frames, "grasp"), PointError(network)
     rests, of = torch.unique(examples.current, return_inverse=True)
     points = network(examples.clouds.take(rests), examples.clouds.take(examples.goal), of)
-    squares = (1000 * (points - examples.targets)).square().mean(dim=1)
+    squares = (1000 * (points - examples.points)).square().mean(dim=1)
     torch.testing.assert_close(losses(objective, examples) * objective.shown, squares)
