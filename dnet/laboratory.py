@@ -15,12 +15,13 @@ from dnet.sim.arms import ArmModel
 from dnet.sim.bullet_world import BulletSettings, BulletWorld
 from dnet.sim.clearance import Clearance
 from dnet.sim.observe import See
+from dnet.sim.portrait import Portrait
 from dnet.sim.quasistatic_world import QuasistaticWorld
 from dnet.sim.scenes import Workspace
 from dnet.sim.tetrahedra import to_vtk
 from dnet.sim.tissue import tissue_mesh
 from dnet.sim.urdf import psm_urdf
-from dnet.sim.world import World
+from dnet.sim.world import GraspingWorld
 from dnet.types import Tissue
 
 SHAPING = ("deformernet", "pybullet", "numpy", "scipy", "numba", "ompl")
@@ -50,10 +51,15 @@ class Laboratory:
     """Everything that moves, sees or plans."""
 
     settings: LaboratorySettings
-    world: World
+    world: GraspingWorld
     planner: ArmPlanner
     arms: ArmModel
     see: See
+
+    def portrait(self, tissue: Tissue, *, arms: bool) -> Portrait:
+        """Return what draws an object as the laboratory's camera sees it."""
+        bullet = self.settings.bullet
+        return Portrait(tissue, camera=bullet.camera, placement=bullet.placement, arms=arms)
 
     def attachments(self, tissue: Tissue) -> dict[str, bytes]:
         """Return what an episode carries along: the arm, the object's mesh, the settings."""

@@ -1,6 +1,6 @@
 """The world in PyBullet: two arms, a soft object, a depth camera."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -14,7 +14,7 @@ from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.bullet_grip import Drive, Grip
 from dnet.sim.foresight import Foresight
 from dnet.sim.furniture import TABLE
-from dnet.sim.grasp import JAW_RADIUS, grasp
+from dnet.sim.grasp import JAW_RADIUS, Grasp, at, grasp, slip
 from dnet.sim.kinematic_grip import KinematicGrip
 from dnet.sim.material import wave_speed
 from dnet.sim.motor_grip import MotorGrip
@@ -88,9 +88,7 @@ class BulletWorld:
             EmptyGrasp: If no node is within the jaws' radius of the manipulation point.
         """
         start = grasp(scene, self.settings.placement, jaw_radius=self.settings.jaw_radius)
-        self._rest, self._mesh = start.rest, start.mesh
-        self._held, self._gripped = start.held, start.gripped
-        self._foresight = Foresight(start, scene.tissue)
+        self._scene, self._rest, self._mesh = scene, start.rest, start.mesh
 
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
@@ -110,9 +108,8 @@ class BulletWorld:
         self.object_id = self._body.body
         self._grip = self._new_grip()
         add_picture(TABLE, client)
-        self._grasped = start.joints
         self._time = 0.0
-        self.restore()
+        self._take(start)
 
     def restore(self) -> None:
         """Put the object back at rest and the arms where they grasped it; the clock goes on."""
@@ -122,8 +119,31 @@ class BulletWorld:
         # Stopping takes a step, in which the nodes still drift at the speed they had.
         self._body.stop()
         self._body.place(every, self._rest)
-        self._grip.take(self._held, self._gripped, joints=self._grasped)
+        self._grip.take(self._start.held, self._start.gripped, joints=self._start.joints)
         self._joints = self._grip.joints
+
+    def release(self) -> None:
+        """Open the moving arm's jaws: the object is held by the other arm alone."""
+        nothing = self._start.gripped[:0]
+        self._start = replace(self._start, gripped=nothing)
+        self._grip.release()
+        self._grip.take(self._start.held, nothing, joints=self._joints)
+
+    def regrasp(self, point: Point) -> None:
+        """Close the moving arm's jaws at a point of the object, at rest, as `reset` does.
+
+        The clock goes on.
+
+        Raises:
+            Unreachable: If the arm cannot reach the point.
+            EmptyGrasp: If no node is within the jaws' radius of it.
+        """
+        self._take(grasp(at(self._scene, point), self._place, jaw_radius=self.settings.jaw_radius))
+
+    def slip(self) -> float:
+        """Return how far what the moving arm grasped is from between its jaws, in metres."""
+        nodes = self._body.nodes()
+        return slip(self._start, self._place, nodes=nodes, joints=self._joints[1])
 
     @property
     def time(self) -> float:
@@ -197,8 +217,17 @@ class BulletWorld:
         self._grip.show()
         return depth_image(self.settings.camera, self._client)
 
+    @property
+    def _place(self) -> Placement:
+        return self.settings.placement
+
+    def _take(self, start: Grasp) -> None:
+        self._start = start
+        self._foresight = Foresight(start, self._scene.tissue)
+        self.restore()
+
     def _new_grip(self) -> Grip:
-        place = self.settings.placement
+        place = self._place
         arms = BulletArms(self._client, place)
         arms.touch_nothing()
         if self.settings.drive == "motor":

@@ -1,16 +1,16 @@
 """The start of an episode: where a scene puts the object and the arms, and what they grip."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Int64
 
 from dnet.errors import EmptyGrasp
-from dnet.geometry.pose import rotation_z
+from dnet.geometry.pose import inverse, rotation_z
 from dnet.sim.arms import Placement
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
 from dnet.sim.tissue import held_nodes, tissue_mesh
-from dnet.types import Joints, Scene
+from dnet.types import Joints, Point, Scene
 
 JAW_RADIUS = 0.016
 """Nodes this near to the tip are between the jaws, in metres."""
@@ -54,3 +54,28 @@ def grasp(scene: Scene, placement: Placement, *, jaw_radius: float = JAW_RADIUS)
         raise EmptyGrasp(scene.manipulation_point, float(distance.min()), jaw_radius)
     held = held_nodes(mesh.nodes)
     return Grasp(joints, mesh, rest, held, np.setdiff1d(near, held))
+
+
+def at(scene: Scene, point: Point) -> Scene:
+    """Return the same scene with the object grasped at `point`."""
+    x, y, z = point.tolist()
+    return replace(scene, manipulation_point=(x, y, z))
+
+
+def slip(start: Grasp, placement: Placement, *, nodes: Vertices, joints: Joints) -> float:
+    """Return how far what was grasped is from where the jaws should have taken it, in metres.
+
+    The mean over the gripped nodes; infinite if none is gripped.
+
+    Args:
+        start: The grasp.
+        placement: Where the arms stand.
+        nodes: Where the nodes are now, (n, 3).
+        joints: Of the moving arm now.
+    """
+    if not len(start.gripped):
+        return float("inf")
+    arm = placement.arms[1]
+    moved = arm.forward(joints) @ inverse(arm.forward(start.joints[1]))
+    expected = start.rest[start.gripped] @ moved[:3, :3].T + moved[:3, 3]
+    return float(np.linalg.norm(nodes[start.gripped] - expected, axis=1).mean())

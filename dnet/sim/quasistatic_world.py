@@ -1,5 +1,7 @@
 """The world without inertia: the object is in equilibrium wherever the arms are."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float64
 
@@ -12,7 +14,7 @@ from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.foresight import Foresight
 from dnet.sim.furniture import TABLE
-from dnet.sim.grasp import JAW_RADIUS, grasp
+from dnet.sim.grasp import JAW_RADIUS, Grasp, at, grasp, slip
 from dnet.sim.soft_picture import SoftPicture
 from dnet.sim.tetrahedra import Vertices
 from dnet.sim.world import Settling
@@ -64,19 +66,18 @@ class QuasistaticWorld:
             Unreachable: If an arm cannot reach its point.
             EmptyGrasp: If no node is within the jaws' radius of the manipulation point.
         """
-        self._grasp = grasp(scene, self._placement, jaw_radius=self._jaw_radius)
-        self._foresight = Foresight(self._grasp, scene.tissue)
-        self._solver = self._foresight.solver
+        start = grasp(scene, self._placement, jaw_radius=self._jaw_radius)
+        self._scene = scene
 
         client = self._client
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
-        self._picture = SoftPicture(client, self._grasp.mesh)
+        self._picture = SoftPicture(client, start.mesh)
         self.object_id = self._picture.body
         self._arms = BulletArms(client, self._placement)
         self._arms.touch_nothing()
         add_picture(TABLE, client)
         self._time = 0.0
-        self.restore()
+        self._take(start)
 
     def restore(self) -> None:
         """Put the object back at rest and the arms where they grasped it; the clock goes on."""
@@ -84,6 +85,30 @@ class QuasistaticWorld:
         rest = self._grasp.rest
         self._iterations = 0
         self._found = self._solver.settle(rest, rest[self._grasp.pinned])
+
+    def release(self) -> None:
+        """Open the moving arm's jaws: the object is held by the other arm alone."""
+        rest = self._grasp.rest
+        self._grasp = replace(self._grasp, gripped=self._grasp.gripped[:0])
+        self._solver.hold(self._grasp.pinned)
+        self._found = self._solver.settle(rest, rest[self._grasp.pinned])
+
+    def regrasp(self, point: Point) -> None:
+        """Close the moving arm's jaws at a point of the object, at rest, as `reset` does.
+
+        The clock goes on.
+
+        Raises:
+            Unreachable: If the arm cannot reach the point.
+            EmptyGrasp: If no node is within the jaws' radius of it.
+        """
+        scene = at(self._scene, point)
+        self._take(grasp(scene, self._placement, jaw_radius=self._jaw_radius))
+
+    def slip(self) -> float:
+        """Return how far what the moving arm grasped is from between its jaws, in metres."""
+        nodes = self._found.nodes
+        return slip(self._grasp, self._placement, nodes=nodes, joints=self._joints[1])
 
     @property
     def time(self) -> float:
@@ -139,6 +164,12 @@ class QuasistaticWorld:
         self._picture.show(self._found.nodes)
         self._arms.show(self._joints)
         return depth_image(self._camera, self._client)
+
+    def _take(self, start: Grasp) -> None:
+        self._grasp = start
+        self._foresight = Foresight(start, self._scene.tissue)
+        self._solver = self._foresight.solver
+        self.restore()
 
     def _jaws(self, joints: Joints) -> Pose:
         return self._placement.arms[1].forward(joints)

@@ -85,3 +85,27 @@ class World(Protocol):
     def look(self) -> DepthImage:
         """Return what the depth camera sees."""
         ...
+
+
+@runtime_checkable
+class GraspingWorld(World, Protocol):
+    """A world in which the moving arm can let go of the object, and grasp it elsewhere."""
+
+    def release(self) -> None:
+        """Open the moving arm's jaws: the object is held by the other arm alone."""
+        ...
+
+    def regrasp(self, point: Point) -> None:
+        """Close the moving arm's jaws at a point of the object, at rest, as `reset` does.
+
+        The clock goes on.
+
+        Raises:
+            Unreachable: If the arm cannot reach the point.
+            EmptyGrasp: If nothing is between the jaws there.
+        """
+        ...
+
+    def slip(self) -> float:
+        """Return how far what the moving arm grasped is from between its jaws, in metres."""
+        ...
