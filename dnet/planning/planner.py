@@ -53,19 +53,26 @@ class ArmPlanner:
         self._checks += 1
         return self._surroundings.obstacle(joints)
 
-    def plan(self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int) -> Plan:
+    def plan(
+        self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int, waypoints: int = 0
+    ) -> Plan:
         """Return how to move the tip by `displacement`, its orientation the same at the end.
 
         Args:
             joints: Where the holding and the moving arm stand, (6,) each.
             displacement: Of the tip in the world, in metres, (3,).
             seed: Of the random search; the same seed gives the same plan.
+            waypoints: Go no farther than so many checked positions, each DENSITY from the one
+                before it; 0 for all of them. What is cut off so is `partial`.
         """
         clock = perf_counter()
         self._checks = 0
         holding, start = joints
         self._surroundings.stand(holding)
         status, path, reason = self._find(start, displacement, seed)
+        if 0 < waypoints < len(path) - 1:
+            cut = f"cut to the first {waypoints} of {len(path) - 1} waypoints"
+            status, path, reason = "partial", path[: waypoints + 1], cut
         path, times = timed(self._arm, path)
         achieved = self._tip(path[-1]) - self._tip(start)
         return Plan(

@@ -25,6 +25,17 @@ def test_a_free_way_is_straight() -> None:
     assert found.times[-1] > 0.04 / 0.2
 
 
+def test_a_plan_that_is_cut_goes_some_waypoints_and_says_so() -> None:
+    planner = ArmPlanner(ARM, Boxes(), PlannerSettings())
+    found = planner.plan((HOLDING, START), LEFT, seed=0, waypoints=10)
+    assert found.status == "partial"
+    assert found.reason == "cut to the first 10 of 40 waypoints"
+    np.testing.assert_allclose(found.achieved, LEFT / 4, atol=1e-9)
+    np.testing.assert_array_equal(found.requested, LEFT)
+    whole = planner.plan((HOLDING, START), LEFT, seed=0, waypoints=40)
+    assert whole.status == "straight"
+
+
 def test_rrt_connect_goes_around_a_wall_and_arrives() -> None:
     boxes = wall(0.025)
     found = plan(boxes)
