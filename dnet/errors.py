@@ -615,3 +615,56 @@ class NoDisplacement(DnetError, ValueError):
             f"{what} {got * 1e3:.1f} mm from the initial shape, need at least {least * 1e3:.1f} mm "
             "to tell where to grasp; choose a goal further away, or give the manipulation point"
         )
+
+
+class BadCloudFile(DnetError, ValueError):
+    """A file that holds no cloud to reach."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        super().__init__(
+            f"{path} {why}; give the visible surface of the object as (n, 3) in metres"
+        )
+
+
+class NoGrasp(DnetError, RuntimeError):
+    """An object that the arm can grasp nowhere."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"the object cannot be grasped: {reason}; move it, or choose another goal")
+
+
+class UnknownTruth(DnetError, ValueError):
+    """A method that needs to know what only a simulated goal tells."""
+
+    def __init__(self, option: str, goal: str) -> None:
+        super().__init__(
+            f"{option} needs to know how the goal was made, and {goal} does not tell; "
+            "choose another method, or a goal of an episode"
+        )
+
+
+class DiskAlmostFull(NoSpace):
+    """A disk on which a run could not be finished."""
+
+    def __init__(self, folder: Path, free: int, need: int) -> None:
+        Exception.__init__(
+            self,
+            f"{folder} has {free / 1e6:.0f} MB free, and a run needs {need / 1e6:.0f} MB to end "
+            "whole; make room, or choose another disk",
+        )
+
+
+class NoGoals(DnetError, FileNotFoundError):
+    """A directory without a single goal."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            f"{path} holds no goal; put episodes (.mcap) or clouds (.npy, .ply, .pcd) there"
+        )
+
+
+class OneOf(DnetError, ValueError):
+    """Two options of which one is needed, and one alone."""
+
+    def __init__(self, one: str, other: str) -> None:
+        super().__init__(f"give either {one} or {other}, and not both")

@@ -23,3 +23,13 @@ def chamfer(one: Cloud, other: Cloud) -> float:
     there = nearest_distances(one, other).mean()
     back = nearest_distances(other, one).mean()
     return float((there + back) / 2)
+
+
+def legacy_chamfer(current: Cloud, goal: Cloud) -> float:
+    """Return what DeformerNet's authors call the Chamfer distance, in metres.
+
+    One-sided, and no mean: the Euclidean norm of the distances from all points of the goal to
+    their nearest in the current cloud. It grows with the square root of the number of points: 0.23
+    is 5 mm root mean square for 2048 of them. For comparison with their figures alone.
+    """
+    return float(np.linalg.norm(nearest_distances(goal, current)))

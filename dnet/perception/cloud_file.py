@@ -1,0 +1,78 @@
+"""Clouds in files of other programs: .npy, .ply and .pcd.
+
+Small pure-Python readers do the work, trimesh (MIT) for .ply and pypcd4 (BSD) for .pcd: both read
+ASCII and binary files. Open3D reads them too, but is 400 MB, and plyfile is under the GPL.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dnet.errors import BadCloudFile, MissingExtra, MissingPath
+from dnet.geometry.sampling import farthest_points
+from dnet.types import Cloud
+
+EXTRA = "clouds"
+
+
+def read_cloud(path: Path, *, points: int) -> Cloud:
+    """Return the cloud of a file, in metres in the world frame, in farthest-point order.
+
+    Points that are not numbers, as depth cameras write them, are left out.
+
+    Args:
+        path: A file whose name ends in one of `READERS`.
+        points: How many points to keep.
+
+    Raises:
+        MissingPath: If there is no such file.
+        BadCloudFile: If it is no cloud, or has too few points.
+        MissingExtra: If the package that reads it is not installed.
+    """
+    if not path.is_file():
+        raise MissingPath(path, "cloud", "give a .npy, .ply or .pcd file")
+    read = READERS[path.suffix.lower()]
+    try:
+        found = np.asarray(read(path))
+    except (MissingExtra, OSError):
+        raise
+    # A reader of somebody else's raises what it likes on a file that is none.
+    except Exception as error:
+        raise BadCloudFile(path, f"cannot be read ({str(error)[:200]})") from error
+    if found.ndim != 2 or found.shape[1] != 3 or not np.issubdtype(found.dtype, np.number):
+        raise BadCloudFile(path, f"holds an array of {found.shape}, {found.dtype}; not (n, 3)")
+    cloud = np.ascontiguousarray(found, dtype=np.float32)
+    cloud = cloud[np.isfinite(cloud).all(axis=1)]
+    if len(cloud) < points:
+        raise BadCloudFile(path, f"has {len(cloud)} finite points, the network takes {points}")
+    return farthest_points(cloud, points)
+
+
+def _read_npy(path: Path) -> Any:
+    return np.load(path, allow_pickle=False)
+
+
+def _read_ply(path: Path) -> Any:
+    try:
+        import trimesh  # noqa: PLC0415
+    except ImportError as error:
+        raise MissingExtra("trimesh", EXTRA, f"reading {path.name}") from error
+    return trimesh.load(path, process=False).vertices
+
+
+def _read_pcd(path: Path) -> Any:
+    try:
+        import pypcd4  # noqa: PLC0415
+    except ImportError as error:
+        raise MissingExtra("pypcd4", EXTRA, f"reading {path.name}") from error
+    return pypcd4.PointCloud.from_path(path).numpy(("x", "y", "z"))
+
+
+READERS: Mapping[str, Callable[[Path], Any]] = {
+    ".npy": _read_npy,
+    ".ply": _read_ply,
+    ".pcd": _read_pcd,
+}
+"""By suffix of the file."""
