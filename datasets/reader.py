@@ -14,7 +14,7 @@ from dnet.datasets.point_cloud import packed_extent, read_point_cloud
 from dnet.datasets.sources import Source
 from dnet.errors import BadEpisode, MissingPath, NoSuchFrame
 from dnet.geometry.camera import Pinhole
-from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Look, Nodes, Place, Transform
+from dnet.types import Cloud, EpisodeMeta, Frame, FrameKind, Goal, Look, Nodes, Place, Transform
 
 SCHEMA_VERSION = "1"
 
@@ -210,6 +210,23 @@ class EpisodeReader:
         """Return the shape to reach, or None for a recording without one."""
         clouds = self._all(GOAL, read_point_cloud)
         return clouds[-1][1] if clouds else None
+
+    def target(self) -> Goal | None:
+        """Return the shape to reach with all that is known of it; None for a recording."""
+        cloud = self.goal()
+        if cloud is None:
+            return None
+        again, nodes, point = (
+            self._all(topic, read_point_cloud)
+            for topic in ("/cloud/goal_again", "/cloud/goal_nodes", "/goal_point")
+        )
+        return Goal(
+            cloud,
+            str(self.meta.settings.get("goal", "")),
+            grasp=point[-1][1][0].astype(np.float64) if point else None,
+            nodes=nodes[-1][1] if nodes else None,
+            again=again[-1][1] if again else None,
+        )
 
     def steps(self) -> list[dict[str, Any]]:
         """Return what each turn of the servo loop saw and did; none for a recording."""

@@ -131,6 +131,13 @@ class Goal:
     cloud: Cloud
     source: str
     """Where it came from, for people: a file and a frame."""
+    grasp: Point | None = None
+    """Where the manipulation point is in it, where that is known: for scores and the oracle."""
+    nodes: Nodes | None = None
+    """The mesh nodes in it, likewise, (m, 3)."""
+    again: Cloud | None = None
+    """The same shape seen once more, sampled otherwise: no figure can be expected below its
+    distance to `cloud`."""
 
 
 PlanStatus = Literal["straight", "rrt_connect", "partial", "failed"]
@@ -159,7 +166,35 @@ class Plan:
     """Wall time of planning; the only figure here that differs from run to run."""
 
 
-Outcome = Literal["converged", "out_of_steps", "planning_failed", "interrupted"]
+Outcome = Literal[
+    "converged",
+    "reached",
+    "stalled",
+    "out_of_steps",
+    "out_of_time",
+    "planning_failed",
+    "grasp_lost",
+    "object_lost",
+    "bad_motion",
+    "disk_full",
+    "interrupted",
+]
+"""How a run ends. `converged`: the predicted motion is small; `reached`: the goal is near;
+`stalled`: it gets no nearer; `grasp_lost`, `object_lost`: the jaws hold nothing, the camera sees
+too little; `bad_motion`: the prediction is no number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Wall time of the stages of one turn, in milliseconds: what differs from run to run."""
+
+    observe: float
+    """From the call of the camera to a cloud and its distance to the goal."""
+    predict: float
+    plan: float = 0.0
+    execute: float = 0.0
+    """Driving the arm and letting the object come to rest: the simulation."""
+    log: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +207,9 @@ class Step:
     motion: Point
     """The motion that the controller asks for."""
     plan: Plan | None = None
-    """What is done about it; None at the last observation of a run."""
+    """What is done about it; None at the last observation of a run, or of a grasp."""
+    latency: Latency | None = None
+    """How long it took, once that is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,3 +219,7 @@ class Trace:
     goal: Goal
     steps: Sequence[Step]
     outcome: Outcome
+    reason: str = ""
+    """What led to it, for people, where its name does not say all."""
+    last: Frame | None = None
+    """What was seen at the end, where no step came of it."""

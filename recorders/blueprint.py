@@ -1,5 +1,6 @@
 """How a scene is laid out in Rerun: the object and both tools at left, curves and log at right."""
 
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import rerun as rr
@@ -10,12 +11,20 @@ from dnet.recorders.frame_columns import GRIPPER
 from dnet.recorders.rerun_scene import (
     CHAMFER,
     JOINTS,
+    LATENCY,
+    LEGACY,
     LOG,
     MOTION_LENGTH,
+    NODES,
     TIME_TIMELINE,
     WORLD,
+    drawn_at,
+    placed,
 )
+from dnet.types import ARMS
 
+PLOTTED = (JOINTS, GRIPPER, LOG, CHAMFER, NODES, LEGACY, MOTION_LENGTH, LATENCY)
+"""What has no place in the scene."""
 EYE = (0.045, -0.275, 0.155)
 """From the front and a little above, as the depth camera stands: the object fills the view."""
 LOOK_AT = (0.005, 0.0, 0.045)
@@ -26,26 +35,95 @@ Company = Literal["alone", "several"]
 """Whether a recording is seen by itself, or the viewer must list it with others."""
 
 SERVO_APPLICATION, RECORDING_APPLICATION = "dnet servo", "dnet record"
+COMPARISON_APPLICATION = "dnet servo, side by side"
 """Rerun shows all recordings of one application in one layout."""
 
 
 def servo_blueprint(*, gripper: bool = False, company: Company = "alone") -> rrb.Blueprint:
-    """Return the layout of a servo run, with the curves of the gripper if they are logged."""
-    curves = {"chamfer": "Chamfer to the goal", "motion": "Predicted motion"}
-    return _blueprint(**curves, gripper=gripper, company=company)
+    """Return the layout of a servo run, with the curves of the gripper if they are logged.
+
+    At right what the run is about, how far the shape is from its goal, comes first and is largest;
+    then what was asked for and what was done; what only some want to know waits in tabs.
+    """
+    curves: list[rrb.View | rrb.Container] = [
+        _plot("Chamfer to the goal (mm), grey: its floor", CHAMFER),
+        rrb.Horizontal(
+            _plot("Nodes off (mm)", NODES), _plot("Legacy norm", LEGACY), column_shares=[1, 1]
+        ),
+        rrb.Tabs(
+            _plot("Predicted motion (mm)", MOTION_LENGTH),
+            *([_gripper()] if gripper else [_plot("Latency (ms)", LATENCY, legend=True)]),
+            _joints(),
+        ),
+    ]
+    return _blueprint(curves, shares=[3, 2, 2, 3], company=company)
 
 
 def recording_blueprint(*, company: Company = "alone") -> rrb.Blueprint:
     """Return the layout of an episode of random shapes."""
-    curves = {"chamfer": "Chamfer to rest", "motion": "Motion from rest"}
-    return _blueprint(**curves, gripper=True, company=company)
+    curves = [
+        _plot("Chamfer to rest (mm)", CHAMFER),
+        _plot("Motion from rest (mm)", MOTION_LENGTH),
+        _gripper(),
+        _joints(),
+    ]
+    return _blueprint(curves, shares=[1] * 5, company=company)
 
 
-def _blueprint(*, chamfer: str, motion: str, gripper: bool, company: Company) -> rrb.Blueprint:
-    scene = rrb.Spatial3DView(
-        name="Scene",
+def _plot(name: str, entity: str, *, legend: bool = False) -> rrb.TimeSeriesView:
+    # The title says what one curve is; a legend would hide a part of it.
+    return rrb.TimeSeriesView(
+        name=name, origin=f"/{entity}", plot_legend=rrb.PlotLegend(visible=legend)
+    )
+
+
+def _gripper() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(name="Gripper (mm)", origin=f"/{GRIPPER}")
+
+
+def _joints() -> rrb.TimeSeriesView:
+    # Twelve names would hide the curves; the viewer shows them under the mouse.
+    return _plot("Joints (rad, insertion in m)", JOINTS)
+
+
+def _blueprint(
+    curves: Sequence[rrb.View | rrb.Container], *, shares: Sequence[int], company: Company
+) -> rrb.Blueprint:
+    return _arranged(
+        rrb.Horizontal(
+            _view(),
+            rrb.Vertical(*curves, _log(), row_shares=list(shares)),
+            column_shares=[5, 3],
+        ),
+        company=company,
+    )
+
+
+def comparison_blueprint(titles: Mapping[str, str]) -> rrb.Blueprint:
+    """Return the layout of several servo runs side by side.
+
+    Args:
+        titles: What each is called, by where its scene hangs.
+    """
+    columns = [
+        rrb.Vertical(
+            _view(title, place=place),
+            _plot("Chamfer to the goal (mm), grey: its floor", placed(place, CHAMFER)),
+            _plot("Nodes off (mm)", placed(place, NODES)),
+            _log(place),
+            row_shares=[6, 2, 1, 2],
+        )
+        for place, title in titles.items()
+    ]
+    return _arranged(rrb.Horizontal(*columns), company="alone")
+
+
+def _view(name: str = "Scene", *, place: str = "") -> rrb.Spatial3DView:
+    shown = [f"/{place}/**", *(f"/{drawn_at(place, arm)}/**" for arm in ARMS)] if place else ["/**"]
+    return rrb.Spatial3DView(
+        name=name,
         origin="/",
-        contents=["/**", *(f"- /{entity}/**" for entity in (JOINTS, GRIPPER, LOG))],
+        contents=[*shown, *(f"- /{placed(place, entity)}/**" for entity in PLOTTED)],
         # The arms' boxes and cylinders would be wire frames.
         defaults=[
             rr.Boxes3D.from_fields(fill_mode="solid"),
@@ -61,31 +139,22 @@ def _blueprint(*, chamfer: str, motion: str, gripper: bool, company: Company) ->
             eye_up=(0.0, 0.0, 1.0),
         ),
     )
-    # The title says what one curve is; a legend would hide a part of it.
-    bare = rrb.PlotLegend(visible=False)
-    curves = [
-        rrb.TimeSeriesView(name=f"{chamfer} (mm)", origin=f"/{CHAMFER}", plot_legend=bare),
-        rrb.TimeSeriesView(name=f"{motion} (mm)", origin=f"/{MOTION_LENGTH}", plot_legend=bare),
-        *([rrb.TimeSeriesView(name="Gripper (mm)", origin=f"/{GRIPPER}")] if gripper else []),
-        # Twelve names would hide the curves; the viewer shows them under the mouse.
-        rrb.TimeSeriesView(
-            name="Joints (rad, insertion in m)", origin=f"/{JOINTS}", plot_legend=bare
-        ),
-    ]
-    log = rrb.TextLogView(
+
+
+def _log(place: str = "") -> rrb.TextLogView:
+    return rrb.TextLogView(
         name="Log",
-        origin=f"/{LOG}",
+        origin=f"/{placed(place, LOG)}",
         columns=rrb.TextLogColumns(
             timeline_columns=[TIME_TIMELINE],
             text_log_columns=[TextLogColumnKind.Body],
         ),
     )
+
+
+def _arranged(layout: rrb.Container, *, company: Company) -> rrb.Blueprint:
     return rrb.Blueprint(
-        rrb.Horizontal(
-            scene,
-            rrb.Vertical(*curves, log, row_shares=[1] * (len(curves) + 1)),
-            column_shares=[5, 3],
-        ),
+        layout,
         # The panel of the layout holds the list of recordings.
         rrb.BlueprintPanel(state="hidden" if company == "alone" else "expanded"),
         rrb.SelectionPanel(state="hidden"),

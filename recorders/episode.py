@@ -5,6 +5,9 @@ The topics, all in the world frame with log times in nanoseconds of simulation f
     /cloud/current       foxglove.PointCloud         the visible surface
     /cloud/nodes         foxglove.PointCloud         mesh nodes, the simulator's ground truth
     /cloud/goal          foxglove.PointCloud         the shape to reach; servo runs only
+    /cloud/goal_again    foxglove.PointCloud         the same shape, sampled otherwise, if known
+    /cloud/goal_nodes    foxglove.PointCloud         its mesh nodes, if known
+    /goal_point          foxglove.PointCloud         its manipulation point, if known
     /manipulation_point  foxglove.PointCloud         one coloured point, for viewers
     /joint_states        foxglove.JointStates        "psm_left/yaw" and so on
     /tf                  foxglove.FrameTransforms    every link of both arms, and the camera
@@ -37,7 +40,7 @@ from dnet.recorders.arms import TIP, ArmModel, orientation_in_world
 from dnet.recorders.json_text import to_json
 from dnet.recorders.mcap_sink import McapSink
 from dnet.recorders.step_text import describe_step
-from dnet.types import Cloud, EpisodeMeta, Frame, Step
+from dnet.types import Cloud, EpisodeMeta, Frame, Nodes, Point, Step
 
 SCHEMA_VERSION = "1"
 MANIPULATION_POINT_COLOR = (255, 60, 40)
@@ -125,16 +128,37 @@ class EpisodeWriter:
             self.log(f"frame {len(self)}: {frame.kind}", time=frame.time)
         self._add(frame)
 
-    def set_goal(self, cloud: Cloud) -> None:
-        """Write the shape that a servo run is to reach.
+    def set_goal(
+        self,
+        cloud: Cloud,
+        *,
+        again: Cloud | None = None,
+        nodes: Nodes | None = None,
+        grasp: Point | None = None,
+    ) -> None:
+        """Write the shape that a servo run is to reach, and what else is known of it.
+
+        Args:
+            cloud: Its visible surface, in metres, (n, 3).
+            again: The same, seen once more and sampled otherwise.
+            nodes: Its mesh nodes.
+            grasp: Where the manipulation point is in it.
 
         Raises:
             BadNumber: If one of its coordinates is NaN or infinite.
         """
         now = self._times[-1] if self._times else 0
-        if not np.isfinite(cloud).all():
+        parts = {
+            "/cloud/goal": cloud,
+            "/cloud/goal_again": again,
+            "/cloud/goal_nodes": nodes,
+            "/goal_point": None if grasp is None else grasp.astype(np.float32)[None],
+        }
+        known = {topic: points for topic, points in parts.items() if points is not None}
+        if not all(np.isfinite(points).all() for points in known.values()):
             raise BadNumber(self.path, "goal", now / 1e9)
-        self._sink.put("/cloud/goal", messages.point_cloud(cloud, now), now)
+        for topic, points in known.items():
+            self._sink.put(topic, messages.point_cloud(points, now), now)
         self._sink.flush()
 
     def add_step(self, step: Step, index: int) -> None:

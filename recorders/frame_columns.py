@@ -2,16 +2,19 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import rerun as rr
 from jaxtyping import Float64
 
 from dnet.geometry.chamfer_to import ChamferTo
+from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.rerun_scene import (
     CHAMFER,
     CURRENT,
     CURRENT_COLOR,
+    DISTANCES,
     JOINTS,
     LOG,
     MANIPULATION_POINT,
@@ -21,6 +24,10 @@ from dnet.recorders.rerun_scene import (
     POINT_COLOR,
     POINT_RADIUS,
     TIME_TIMELINE,
+    TRUE_COLOR,
+    TRUE_MOTION,
+    framed,
+    placed,
 )
 from dnet.types import ARMS, Frame, Point, Transform
 
@@ -45,17 +52,22 @@ class Block:
 class FrameColumns:
     """Sends blocks of frames to the entities to which a `RerunScene` logs one at a time."""
 
-    def __init__(self, recording: rr.RecordingStream) -> None:
-        self._recording = recording
-        # What never changes is said once, not at every frame.
+    def __init__(
+        self, recording: rr.RecordingStream, *, plain: bool = True, place: str = ""
+    ) -> None:
+        self._recording, self._place = recording, place
+        # What never changes is said once, not at every frame. Points that are coloured by how far
+        # they are from the goal change: a colour that is said once would hide theirs.
+        current: dict[str, Any] = {"colors": CURRENT_COLOR} if plain else {}
         looks = {
-            CURRENT: rr.Points3D.from_fields(colors=CURRENT_COLOR, radii=POINT_RADIUS),
+            CURRENT: rr.Points3D.from_fields(radii=POINT_RADIUS, **current),
             MANIPULATION_POINT: rr.Points3D.from_fields(colors=POINT_COLOR, radii=0.003),
             MOTION: rr.Arrows3D.from_fields(colors=MOTION_COLOR, radii=0.0012),
+            TRUE_MOTION: rr.Arrows3D.from_fields(colors=TRUE_COLOR, radii=0.0007),
             GRIPPER: rr.SeriesLines(names=["x", "y", "z"], colors=AXIS_COLORS, widths=[2, 2, 2]),
         }
         for entity, look in looks.items():
-            recording.log(entity, look, static=True)
+            recording.log(placed(place, entity), look, static=True)
 
     def send_frames(self, block: Block) -> None:
         """Send what was seen and where the arms were."""
@@ -85,12 +97,29 @@ class FrameColumns:
             values = [1e3 * distance(block.frames[row].cloud) for row in rows]
             self._send(block, CHAMFER, rr.Scalars.columns(scalars=values), rows=rows)
 
+    def send_errors(self, block: Block, distance: GoalDistance) -> None:
+        """Send how far each frame is from the goal of a run: colours, curves, the true motion."""
+        rows = [row for row, one in enumerate(block.frames) if len(one.cloud)]
+        if not rows:
+            return
+        found = [distance(block.frames[row]) for row in rows]
+        colors = rr.Points3D.columns(colors=np.concatenate([one.colors for one in found]))
+        self._send(block, CURRENT, colors.partition([len(one.colors) for one in found]), rows=rows)
+        for name in found[0].figures:
+            values = [one.figures[name] for one in found]
+            self._send(block, DISTANCES[name], rr.Scalars.columns(scalars=values), rows=rows)
+        motions = [one.motion for one in found if one.motion is not None]
+        if motions:
+            origins = [block.frames[row].grasp for row in rows]
+            arrows = rr.Arrows3D.columns(origins=origins, vectors=motions)
+            self._send(block, TRUE_MOTION, arrows, rows=rows)
+
     def send_lines(self, lines: Sequence[tuple[float, str]]) -> None:
         """Send times and texts of the log, on the time line alone."""
         if lines:
             times, texts = zip(*lines, strict=True)
             self._recording.send_columns(
-                LOG,
+                placed(self._place, LOG),
                 indexes=[rr.TimeColumn(TIME_TIMELINE, duration=times)],
                 columns=rr.TextLog.columns(text=texts, level=["INFO"] * len(texts)),
             )
@@ -107,8 +136,8 @@ class FrameColumns:
             columns = rr.Transform3D.columns(
                 translation=np.stack([entry.translation for entry in found]),
                 quaternion=np.stack([entry.rotation for entry in found]),
-                parent_frame=[entry.parent for entry in found],
-                child_frame=[child] * len(found),
+                parent_frame=[framed(self._place, entry.parent) for entry in found],
+                child_frame=[framed(self._place, child)] * len(found),
             )
             self._send(block, f"tf/{child}", columns, rows=rows)
 
@@ -123,7 +152,7 @@ class FrameColumns:
         """Send a column with a value at each of some rows of a block, by default at all."""
         at = range(len(block.frames)) if rows is None else rows
         self._recording.send_columns(
-            entity,
+            placed(self._place, entity),
             indexes=[
                 rr.TimeColumn(COUNTER, sequence=[block.first + row for row in at]),
                 rr.TimeColumn(TIME_TIMELINE, duration=[block.frames[row].time for row in at]),

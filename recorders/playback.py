@@ -4,12 +4,12 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 
 from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording, Unmerged
 from dnet.recorders.blueprint import Company
-from dnet.recorders.replay import OpenEpisode, application, replay
+from dnet.recorders.replay import OpenEpisode, application, replay, replay_beside
 from dnet.recorders.salvage import whole_recording
 from dnet.recorders.viewer import RERUN, draw, show
 from dnet.types import Place
@@ -25,6 +25,7 @@ def play(
     screenshot: Path | None = None,
     save: Path | None = None,
     seconds: float | None = None,
+    beside: bool = False,
     watched: AbstractContextManager[Progress] | None = None,
 ) -> None:
     """Show episodes (`.mcap`) and runs (`.rrd`), also unfinished ones (`.part`).
@@ -39,6 +40,7 @@ def play(
         save: Write the recordings to this `.rrd` instead of opening a window.
         seconds: When to draw the picture, in seconds of simulation; left out, the end of a
             servo run and the largest motion of an episode.
+        beside: Show servo runs (`.mcap`) side by side in one view, instead of each by itself.
         watched: Entered while the files are made ready, and told how far that is.
 
     Raises:
@@ -57,11 +59,12 @@ def play(
         raise OccupiedOutput(save, "a Rerun recording")
     for file in chosen:
         _check(file)
-    if save is None and screenshot is not None:
+    if save is None and screenshot is not None and not beside:
         chosen = chosen[:1]
     with tempfile.TemporaryDirectory() as directory:
         with watched or nullcontext(_unwatched) as progress:
-            shown = _made_ready(chosen, Path(directory), open_episode, progress)
+            ready = _made_beside if beside and len(chosen) > 1 else _made_ready
+            shown = ready(chosen, Path(directory), open_episode, progress)
         recordings = [path for path, _ in shown]
         first, best = shown[0]
         if save is not None:
@@ -94,6 +97,19 @@ def _made_ready(
             shown.append(_converted(file, place, open_episode, laid_out, company))
         progress(number + 1, len(files))
     return shown
+
+
+def _made_beside(
+    files: Sequence[Place], directory: Path, open_episode: OpenEpisode, progress: Progress
+) -> list[tuple[Path, float | None]]:
+    """Return all of them as one `.rrd`, and the time that shows it best."""
+    copy = directory / "beside.rrd"
+    progress(0, 1)
+    with ExitStack() as opened:
+        episodes = [opened.enter_context(closing(open_episode(file))) for file in files]
+        best = replay_beside(episodes, copy)
+    progress(1, 1)
+    return [(copy, best)]
 
 
 def _converted(

@@ -13,16 +13,19 @@ from jaxtyping import Float64
 from dnet.errors import BadEpisode
 from dnet.geometry.chamfer_to import ChamferTo
 from dnet.recorders.blueprint import (
+    COMPARISON_APPLICATION,
     RECORDING_APPLICATION,
     SERVO_APPLICATION,
     Company,
+    comparison_blueprint,
     recording_blueprint,
     servo_blueprint,
 )
 from dnet.recorders.frame_columns import COUNTER, Block, FrameColumns
+from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.keypoints import log_keypoint, log_rest_shape
 from dnet.recorders.rerun_scene import RerunScene
-from dnet.types import Cloud, EpisodeMeta, Frame, Place, Point, Transform
+from dnet.types import EpisodeMeta, Frame, Goal, Place, Point, Transform
 
 URDF = "psm.urdf"
 JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
@@ -57,8 +60,8 @@ class RecordedEpisode(Protocol):
         """Return the arms' links at one frame."""
         ...
 
-    def goal(self) -> Cloud | None:
-        """Return the shape to reach, if there is one."""
+    def target(self) -> Goal | None:
+        """Return the shape to reach with all that is known of it, if there is one."""
         ...
 
     def steps(self) -> Sequence[Mapping[str, Any]]:
@@ -97,7 +100,7 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
     Raises:
         BadEpisode: If a part of the episode cannot be read.
     """
-    goal = episode.goal()
+    goal = episode.target()
     recording = rr.RecordingStream(
         application(episode), recording_id=_recording_id(episode.path, episode.meta.episode_id)
     )
@@ -109,23 +112,71 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
         scene = _scene(recording, episode)
         scene.name_joints(JOINT_NAMES)
         log_keypoint(recording, "hold", np.array(episode.meta.scene.hold))
-        columns = FrameColumns(recording)
+        columns = FrameColumns(recording, plain=goal is None or not len(goal.cloud))
         columns.send_lines(episode.lines())
         if goal is None:
             return _replay_shapes(episode, recording, columns)
-        scene.log_goal(goal)
+        scene.log_goal(goal.cloud)
         return _replay_run(episode, scene, columns, goal)
     finally:
         recording.flush()
         recording.disconnect()
 
 
+def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
+    """Write servo runs side by side as the Rerun recording `path`; return the time of their end.
+
+    Args:
+        episodes: Two runs or more, each with a goal.
+        path: The `.rrd` to write.
+
+    Raises:
+        BadEpisode: If one of them is no servo run, or a part of it cannot be read.
+    """
+    recording = rr.RecordingStream(
+        COMPARISON_APPLICATION,
+        recording_id=_recording_id(path, "+".join(str(one.path) for one in episodes)),
+    )
+    recording.set_log_time_enabled(False)
+    names = [place_of(number) for number in range(len(episodes))]
+    titles = {name: _title(episode) for name, episode in zip(names, episodes, strict=True)}
+    end = 0.0
+    try:
+        recording.save(path, default_blueprint=comparison_blueprint(titles))
+        recording.send_recording_name(" | ".join(titles.values()))
+        for name, episode in zip(names, episodes, strict=True):
+            goal = episode.target()
+            if goal is None:
+                raise BadEpisode(episode.path, "is no servo run", "play it by itself")
+            scene = _scene(recording, episode, place=name)
+            scene.name_joints(JOINT_NAMES)
+            columns = FrameColumns(recording, plain=not len(goal.cloud), place=name)
+            columns.send_lines(episode.lines())
+            scene.log_goal(goal.cloud)
+            end = max(end, _replay_run(episode, scene, columns, goal))
+    finally:
+        recording.flush()
+        recording.disconnect()
+    return end
+
+
+def place_of(number: int) -> str:
+    """Return where the scene of a run hangs, by its number from 0."""
+    return f"run_{number + 1}"
+
+
+def _title(episode: RecordedEpisode) -> str:
+    controller = episode.meta.settings.get("controller", "")
+    goal = episode.meta.settings.get("goal", episode.meta.episode_id)
+    return f"{controller} to {goal}" if controller else str(goal)
+
+
 def application(episode: RecordedEpisode) -> str:
     """Return the application that an episode is a recording of."""
-    return RECORDING_APPLICATION if episode.goal() is None else SERVO_APPLICATION
+    return RECORDING_APPLICATION if episode.target() is None else SERVO_APPLICATION
 
 
-def _layout(goal: Cloud | None, company: Company | None) -> rrb.Blueprint | None:
+def _layout(goal: Goal | None, company: Company | None) -> rrb.Blueprint | None:
     if company is None:
         return None
     if goal is None:
@@ -156,17 +207,19 @@ def _replay_shapes(
 
 
 def _replay_run(
-    episode: RecordedEpisode, scene: RerunScene, columns: FrameColumns, goal: Cloud
+    episode: RecordedEpisode, scene: RerunScene, columns: FrameColumns, goal: Goal
 ) -> float:
     """Send a servo run; return the time of its end."""
-    distance = ChamferTo(goal) if len(goal) else None
+    distance = GoalDistance(goal) if len(goal.cloud) else None
     seen: dict[float, tuple[int, Point]] = {}
     for block in _blocks(episode):
         columns.send_frames(block)
         if distance is not None:
-            columns.send_distances(block, distance)
+            columns.send_errors(block, distance)
         for index, one in enumerate(block.frames, start=block.first):
             seen[one.time] = index, one.grasp
+    if distance is not None and seen:
+        scene.log_floor(distance.floor, (min(seen), max(seen)))
     for step in episode.steps():
         if step["time"] in seen:
             index, grasp = seen[step["time"]]
@@ -209,10 +262,12 @@ def _recording_id(path: Place, episode: str) -> str:
     return hashlib.sha256(f"{episode}\n{place}".encode()).hexdigest()[:32]
 
 
-def _scene(recording: rr.RecordingStream, episode: RecordedEpisode) -> RerunScene:
+def _scene(
+    recording: rr.RecordingStream, episode: RecordedEpisode, *, place: str = ""
+) -> RerunScene:
     urdf = episode.attachment(URDF) if URDF in episode.attachments else b""
     try:
-        return RerunScene(recording, urdf=urdf.decode(), counter=COUNTER)
+        return RerunScene(recording, urdf=urdf.decode(), counter=COUNTER, place=place)
     except (ValueError, RuntimeError) as error:
         why = f"has an unreadable attachment {URDF} ({error})"
         raise BadEpisode(episode.path, why, "record it again") from error

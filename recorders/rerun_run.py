@@ -10,9 +10,10 @@ from jaxtyping import Float64
 from dnet.errors import OccupiedOutput
 from dnet.recorders.arms import ArmModel
 from dnet.recorders.blueprint import SERVO_APPLICATION, servo_blueprint
-from dnet.recorders.rerun_scene import CHAMFER, PLANNING, RerunScene, transforms_along
+from dnet.recorders.goal_distance import GoalDistance
+from dnet.recorders.rerun_scene import CHAMFER, RerunScene, transforms_along
 from dnet.recorders.step_text import describe_step
-from dnet.types import Cloud, Frame, JointPath, Step
+from dnet.types import Cloud, Frame, Goal, JointPath, Step
 
 
 class RerunRun:
@@ -46,6 +47,8 @@ class RerunRun:
         self._scene = RerunScene(self._recording, urdf=urdf, counter="step")
         self._scene.name_joints(arms.joint_names)
         self._closed = False
+        self._distance: GoalDistance | None = None
+        self._began: float | None = None
 
     def __enter__(self) -> "RerunRun":
         return self
@@ -66,6 +69,19 @@ class RerunRun:
         self._scene.log_goal(cloud)
         self._recording.flush()
 
+    def log_target(self, goal: Goal) -> None:
+        """Log the shape to reach, and what is known of it, for all times."""
+        self.log_goal(goal.cloud)
+        self._distance = GoalDistance(goal)
+
+    def log_latency(self, index: int, step: Step) -> None:
+        """Log how long the stages of a step took, at its time."""
+        if step.latency is None:
+            return
+        self._scene.set_time(step.frame.time, count=index)
+        self._scene.log_latency(step.latency)
+        self._recording.flush()
+
     def log_step(self, index: int, step: Step, tip_path: Float64[np.ndarray, "_ 3"] | None) -> None:
         """Log one turn of the servo loop and flush it.
 
@@ -78,12 +94,17 @@ class RerunRun:
         self._now, self._step = frame.time, index
         scene = self._scene
         scene.set_time(frame.time, count=index)
-        scene.log_frame(frame, self._arms.transforms(frame.joints))
+        distances = None if self._distance is None else self._distance(frame)
+        scene.log_frame(frame, self._arms.transforms(frame.joints), distances)
         scene.log_motion(frame.grasp, step.motion)
         scene.log_tip_path(tip_path)
-        scene.log_scalar(CHAMFER, 1e3 * step.chamfer)
-        if plan is not None:
-            scene.log_scalar(PLANNING, plan.milliseconds)
+        if self._distance is None:
+            scene.log_scalar(CHAMFER, 1e3 * step.chamfer)
+        elif self._began is None:
+            self._began = frame.time
+        else:
+            scene.log_floor(self._distance.floor, (self._began, frame.time))
+            scene.set_time(frame.time, count=index)
         troubled = plan is not None and plan.status in ("partial", "failed")
         scene.log_text(describe_step(step, index), level="WARN" if troubled else "INFO")
         self._recording.flush()
@@ -107,9 +128,12 @@ class RerunRun:
         self._scene.log_joints_along(times, joints)
         self._recording.flush()
 
-    def log_text(self, message: str) -> None:
-        """Log a line for people at the time of the last step."""
-        self._scene.set_time(self._now, count=self._step)
+    def log_text(self, message: str, *, time: float | None = None) -> None:
+        """Log a line for people, at `time` or at that of the last step."""
+        if time is None:
+            self._scene.set_time(self._now, count=self._step)
+        else:
+            self._scene.set_time(time)
         self._scene.log_text(message)
         self._recording.flush()
 

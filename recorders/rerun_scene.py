@@ -4,7 +4,7 @@ Servo runs and replayed episodes log the same entities, so one blueprint shows b
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,20 +13,29 @@ from jaxtyping import Float64
 from rerun.urdf import UrdfTree
 
 from dnet.recorders.arms import ArmModel
-from dnet.types import ARMS, Cloud, Frame, JointPath, Joints, Point, Transform
+from dnet.recorders.goal_distance import Colors, Distances
+from dnet.types import ARMS, Cloud, Frame, JointPath, Joints, Latency, Point, Transform
 
 WORLD = "world"
 TIME_TIMELINE = "sim_time"
 
 CURRENT, GOAL = "cloud/current", "cloud/goal"
 MANIPULATION_POINT, MOTION, TIP_PATH, TABLE = "manipulation_point", "motion", "plan/tip", "table"
-CHAMFER, MOTION_LENGTH, PLANNING, JOINTS = "chamfer", "motion_length", "planning", "joints"
+CHAMFER, MOTION_LENGTH, LATENCY, JOINTS = "chamfer", "motion_length", "latency", "joints"
 LOG = "log"
+TRUE_MOTION, LEGACY, NODES = "motion/true", "legacy", "node_distance"
+DISTANCES = {"chamfer": CHAMFER, "legacy": LEGACY, "nodes": NODES}
+"""The curve of each figure of `GoalDistance`."""
+
+STAGES = ("observe", "predict", "plan", "execute", "log")
+"""Of a turn of the servo loop, as `Latency` names them."""
 
 CURRENT_COLOR = (92, 158, 255)
 GOAL_COLOR = (64, 190, 96)
 POINT_COLOR = (255, 72, 48)
 MOTION_COLOR = (255, 196, 0)
+TRUE_COLOR = (245, 245, 245)
+FLOOR_COLOR = (150, 150, 158)
 PATH_COLOR = (226, 110, 255)
 TABLE_COLOR = (58, 60, 68)
 
@@ -42,13 +51,17 @@ class RerunScene:
         recording: The stream to log to.
         urdf: The URDF of one arm, drawn once for each; empty draws no arms.
         counter: Name of the timeline that counts what is logged, such as "step".
+        place: Where its entities hang, so that one recording can hold several scenes.
     """
 
-    def __init__(self, recording: rr.RecordingStream, *, urdf: str, counter: str) -> None:
+    def __init__(
+        self, recording: rr.RecordingStream, *, urdf: str, counter: str, place: str = ""
+    ) -> None:
         self.recording = recording
+        self.place = place
         self._counter = counter
         # Entities without a named frame hang on the implicit root, which stands in the world.
-        self._static("/", rr.Transform3D(parent_frame=WORLD, child_frame="tf#/"))
+        recording.log("/", rr.Transform3D(parent_frame=WORLD, child_frame="tf#/"), static=True)
         self._log_table()
         if urdf:
             self._log_arms(urdf)
@@ -74,18 +87,23 @@ class RerunScene:
             )
             self._static(f"{GOAL}/label", text)
 
-    def log_cloud(self, cloud: Cloud) -> None:
-        """Log the visible surface."""
-        points = rr.Points3D(_aligned(cloud), colors=CURRENT_COLOR, radii=POINT_RADIUS)
+    def log_cloud(self, cloud: Cloud, colors: Colors | None = None) -> None:
+        """Log the visible surface, in one colour or each point in its own."""
+        chosen = CURRENT_COLOR if colors is None else colors
+        points = rr.Points3D(_aligned(cloud), colors=chosen, radii=POINT_RADIUS)
         self._log(CURRENT, points)
 
     def log_manipulation_point(self, point: Point) -> None:
         """Log where the moving arm holds the object."""
         self._log(MANIPULATION_POINT, rr.Points3D([point], colors=POINT_COLOR, radii=0.003))
 
-    def log_frame(self, frame: Frame, transforms: Sequence[Transform]) -> None:
-        """Log what was seen and where the arms were."""
-        self.log_cloud(frame.cloud)
+    def log_frame(
+        self, frame: Frame, transforms: Sequence[Transform], distances: Distances | None = None
+    ) -> None:
+        """Log what was seen and where the arms were, and how far it is from the goal."""
+        self.log_cloud(frame.cloud, None if distances is None else distances.colors)
+        if distances is not None:
+            self.log_distances(frame.grasp, distances)
         self.log_manipulation_point(frame.grasp)
         self.log_transforms(transforms)
         self.log_joints(frame.joints)
@@ -95,6 +113,25 @@ class RerunScene:
         arrow = rr.Arrows3D(origins=[grasp], vectors=[motion], colors=MOTION_COLOR, radii=0.0012)
         self._log(MOTION, arrow)
         self.log_scalar(MOTION_LENGTH, 1e3 * float(np.linalg.norm(motion)))
+
+    def log_distances(self, grasp: Point, distances: Distances) -> None:
+        """Log curves of how far a frame is from the goal, and the true motion as an arrow."""
+        for name, value in distances.figures.items():
+            self.log_scalar(DISTANCES[name], value)
+        if distances.motion is not None:
+            arrow = rr.Arrows3D(
+                origins=[grasp], vectors=[distances.motion], colors=TRUE_COLOR, radii=0.0007
+            )
+            self._log(TRUE_MOTION, arrow)
+
+    def log_floor(self, floor: Mapping[str, float], times: tuple[float, float]) -> None:
+        """Log the least that each curve can be expected to come to, from one time to another."""
+        for name, value in floor.items():
+            self.recording.send_columns(
+                placed(self.place, f"{DISTANCES[name]}/floor"),
+                indexes=[rr.TimeColumn(TIME_TIMELINE, duration=times)],
+                columns=rr.Scalars.columns(scalars=[value, value]),
+            )
 
     def log_tip_path(self, path: Float64[np.ndarray, "_ 3"] | None) -> None:
         """Log where the tip of the moving arm is planned to go."""
@@ -111,8 +148,8 @@ class RerunScene:
                 rr.Transform3D(
                     translation=entry.translation,
                     quaternion=rr.Quaternion(xyzw=entry.rotation),
-                    parent_frame=entry.parent,
-                    child_frame=entry.child,
+                    parent_frame=framed(self.place, entry.parent),
+                    child_frame=framed(self.place, entry.child),
                 ),
             )
 
@@ -125,13 +162,13 @@ class RerunScene:
         when = rr.TimeColumn(TIME_TIMELINE, duration=times)
         for column in zip(*rows, strict=True):
             self.recording.send_columns(
-                f"tf/{column[0].child}",
+                placed(self.place, f"tf/{column[0].child}"),
                 indexes=[when],
                 columns=rr.Transform3D.columns(
                     translation=np.stack([entry.translation for entry in column]),
                     quaternion=np.stack([entry.rotation for entry in column]),
-                    parent_frame=[entry.parent for entry in column],
-                    child_frame=[entry.child for entry in column],
+                    parent_frame=[framed(self.place, entry.parent) for entry in column],
+                    child_frame=[framed(self.place, entry.child) for entry in column],
                 ),
             )
 
@@ -147,12 +184,18 @@ class RerunScene:
         when = rr.TimeColumn(TIME_TIMELINE, duration=times)
         for arm, path in zip(ARMS, joints, strict=True):
             self.recording.send_columns(
-                f"{JOINTS}/{arm}", indexes=[when], columns=rr.Scalars.columns(scalars=path)
+                placed(self.place, f"{JOINTS}/{arm}"),
+                indexes=[when],
+                columns=rr.Scalars.columns(scalars=path),
             )
 
     def log_scalar(self, entity: str, value: float) -> None:
         """Log one figure of a curve."""
         self._log(entity, rr.Scalars(value))
+
+    def log_latency(self, latency: Latency) -> None:
+        """Log how long each stage of a turn took, in milliseconds, as curves."""
+        self._log(LATENCY, rr.Scalars([getattr(latency, name) for name in STAGES]))
 
     def log_text(self, text: str, *, level: str = "INFO") -> None:
         """Log a line for people."""
@@ -180,11 +223,14 @@ class RerunScene:
             path = Path(directory) / "psm.urdf"
             path.write_text(urdf, encoding="utf-8")
             for arm in ARMS:
-                tree = UrdfTree.from_file_path(path, entity_path_prefix=arm, frame_prefix=f"{arm}/")
+                prefix = drawn_at(self.place, arm)
+                tree = UrdfTree.from_file_path(
+                    path, entity_path_prefix=prefix, frame_prefix=framed(self.place, f"{arm}/")
+                )
                 # The joints move: static transforms would hold every link at position zero.
                 shapes = tree.stream(include_joint_transforms=False)
                 # The shapes for collision checks would be drawn over those for the eye.
-                collision = f"/{arm}/{tree.name}/collision_geometries/**"
+                collision = f"/{prefix}/{tree.name}/collision_geometries/**"
                 self.recording.send_chunks(shapes.drop(content=collision))
 
     def _name_series(self) -> None:
@@ -192,13 +238,33 @@ class RerunScene:
         self._static(
             MOTION_LENGTH, rr.SeriesLines(names="motion (mm)", colors=MOTION_COLOR, widths=2)
         )
-        self._static(PLANNING, rr.SeriesLines(names="planning (ms)", colors=PATH_COLOR, widths=2))
+        self._static(LEGACY, rr.SeriesLines(names="legacy norm", colors=CURRENT_COLOR, widths=2))
+        self._static(NODES, rr.SeriesLines(names="nodes (mm)", colors=POINT_COLOR, widths=2))
+        for entity in DISTANCES.values():
+            floor = rr.SeriesLines(names="floor", colors=FLOOR_COLOR, widths=1)
+            self._static(f"{entity}/floor", floor)
+        self._static(LATENCY, rr.SeriesLines(names=list(STAGES)))
 
     def _log(self, entity: str, value: rr.AsComponents) -> None:
-        self.recording.log(entity, value)
+        self.recording.log(placed(self.place, entity), value)
 
     def _static(self, entity: str, value: rr.AsComponents) -> None:
-        self.recording.log(entity, value, static=True)
+        self.recording.log(placed(self.place, entity), value, static=True)
+
+
+def placed(place: str, entity: str) -> str:
+    """Return where an entity of the scene at `place` hangs."""
+    return f"{place}/{entity}" if place else entity
+
+
+def framed(place: str, frame: str) -> str:
+    """Return what a frame of the scene at `place` is called; all scenes stand in one world."""
+    return frame if not place or frame == WORLD else f"{place}.{frame}"
+
+
+def drawn_at(place: str, arm: str) -> str:
+    """Return where an arm's shapes hang: Rerun takes no path there, but a name."""
+    return f"{place}_{arm}" if place else arm
 
 
 def _aligned(cloud: Cloud) -> Cloud:

@@ -1,5 +1,7 @@
 """What a step of the servo loop says to people."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from dnet.types import Step
@@ -13,3 +15,11 @@ def describe_step(step: Step, index: int) -> str:
         text += f", plan {step.plan.status}"
         text += f" ({step.plan.reason})" if step.plan.reason else ""
     return text
+
+
+def describe_latency(step: Step) -> str:
+    """Return how long the stages of a step took, to go behind its description."""
+    if step.latency is None:
+        return ""
+    stages = ", ".join(f"{name} {value:.0f}" for name, value in asdict(step.latency).items())
+    return f" ({stages} ms)"

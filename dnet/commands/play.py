@@ -12,11 +12,13 @@ class Play:
     """Play episodes and servo runs back in Rerun, or draw a picture of one without a screen.
 
     The view shows the object (blue), both arms, and curves of shape distance, motion, gripper and
-    joints. A servo run shows its goal (green), the motion that was asked for (arrow) and where
-    the tip was planned to go; its .rrd shows the whole path. A recording shows its rest shape
-    (grey) and how far the grasp has moved since (arrow).
+    joints. A servo run shows its goal (green), each point in the colour of its distance from that,
+    the motion that was asked for (arrow) and the true one (white). A recording shows its rest
+    shape (grey) and how far the grasp has moved since (arrow).
 
-    A directory opens its episodes side by side, each under its id in the list at the left of the
+    Two directories of `dnet servo`, or more, are shown side by side in one view.
+
+    A directory of episodes opens all of them, each under its id in the list at the left of the
     window. --episode and --filter choose among them: --filter opens the episodes with a frame for
     which a condition holds, and takes SQL as `dnet inspect filter` does.
 
@@ -24,7 +26,9 @@ class Play:
 
     Example: dnet play data/box --filter "kind = 'shape' and motion_mm > 80"
 
-    Example: dnet play runs/servo/run.rrd --screenshot run.png
+    Example: dnet play runs/servo --screenshot run.png
+
+    Example: dnet play eval/deformernet/random-7 eval/oracle/random-7
     """
 
     files: Annotated[
@@ -55,14 +59,17 @@ class Play:
         from rich.console import Console
 
         from dnet.commands.index_bar import reading
-        from dnet.commands.playlist import Choice, playlist
+        from dnet.commands.playlist import Choice, playlist, side_by_side
         from dnet.datasets.reader import EpisodeReader
         from dnet.recorders.playback import play
 
         console = Console(stderr=True)
         wanted = [one.strip() for some in self.episode for one in some.split(",") if one.strip()]
+        beside = None if wanted or self.filter else side_by_side(self.files)
+        choice = Choice(wanted, self.filter, self.limit)
         play(
-            playlist(self.files, Choice(wanted, self.filter, self.limit), console),
+            beside or playlist(self.files, choice, console),
+            beside=beside is not None,
             open_episode=EpisodeReader,
             screenshot=self.screenshot,
             save=self.save,

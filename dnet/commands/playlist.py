@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from dnet.types import Place
 
 
-RECORDINGS = ("run.rrd", "training.rrd", "grasp.rrd")
-"""What the directories of `dnet servo`, `train` and `evaluate grasp` hold for the viewer."""
+RECORDINGS = ("run.rrd", "training.rrd", "grasp.rrd", "run.mcap")
+"""What the directories of `dnet servo`, `train` and `evaluate grasp` hold for the viewer, the
+best first."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,14 @@ def playlist(places: "Sequence[Place]", choice: Choice, console: "Console") -> "
         else:
             files.append(place)
     return files
+
+
+def side_by_side(places: "Sequence[Place]") -> "list[Place] | None":
+    """Return the episodes of servo runs if nothing but directories of two or more is given."""
+    runs = [Path(place) / "run.mcap" for place in places]
+    if len(runs) < 2 or not all(run.is_file() for run in runs):
+        return None
+    return list(runs)
 
 
 def _recording(place: "Place") -> "Place":

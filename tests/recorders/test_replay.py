@@ -11,8 +11,8 @@ from dnet.errors import BadEpisode
 from dnet.geometry.chamfer import chamfer
 from dnet.recorders.blueprint import Company
 from dnet.recorders.episode import EpisodeWriter
-from dnet.recorders.replay import FRAMES_AT_A_TIME, replay
-from tests.recorders.rollout import ARMS, frame, frames, meta, write, write_servo
+from dnet.recorders.replay import FRAMES_AT_A_TIME, replay, replay_beside
+from tests.recorders.rollout import ARMS, frame, frames, meta, step, write, write_servo
 from tests.recorders.rrd import entities, rows
 
 
@@ -215,3 +215,58 @@ def test_an_unreadable_urdf_is_named(tmp_path: Path, urdf: bytes) -> None:
         writer.finish({})
     with pytest.raises(BadEpisode, match=r"a\.mcap has an unreadable attachment psm\.urdf"):
         replayed(source)
+
+
+def known_run(path: Path) -> Path:
+    """Write a servo run of two turns of which all is known."""
+    seen = frames(2)
+    goal = seen[-1]
+    with EpisodeWriter(path, meta(path.stem), arms=ARMS, attachments={}) as writer:
+        writer.set_goal(goal.cloud, again=goal.cloud, nodes=goal.nodes, grasp=goal.grasp)
+        for index, one in enumerate((seen[0], goal)):
+            writer.add_step(step(one, goal, planned=one is not goal), index)
+        writer.finish({"outcome": "converged"})
+    return path
+
+
+def test_a_run_is_coloured_by_its_distance_to_the_goal_and_shows_the_true_motion(
+    tmp_path: Path,
+) -> None:
+    path, _ = replayed(known_run(tmp_path / "run.mcap"))
+    first, last = rows(path, "/cloud/current", "Points3D:colors", timeline="frame")
+    assert len(set(first[1])) > 1
+    assert len(set(last[1])) == 1
+    arrows = rows(path, "/motion/true", "Arrows3D:vectors", timeline="frame")
+    seen = frames(2)
+    np.testing.assert_allclose(arrows[0][1][0], seen[-1].grasp - seen[0].grasp, atol=1e-7)
+    nodes = rows(path, "/node_distance", "Scalars:scalars", timeline="frame")
+    assert nodes[0][1][0] > 1.0
+    assert nodes[-1][1][0] == 0.0
+    floor = rows(path, "/chamfer/floor", "Scalars:scalars", timeline="sim_time")
+    assert [value for _, value in floor] == [[0.0], [0.0]]
+
+
+def test_runs_side_by_side_are_one_recording_with_a_place_for_each(tmp_path: Path) -> None:
+    paths = [known_run(tmp_path / name) for name in ("a.mcap", "b.mcap")]
+    target = tmp_path / "both.rrd"
+    with EpisodeReader(paths[0]) as one, EpisodeReader(paths[1]) as other:
+        assert replay_beside([one, other], target) == frames(2)[-1].time
+    found = entities(target)
+    for place in ("run_1", "run_2"):
+        logged = ("cloud/current", "cloud/goal", "motion", "chamfer", "log")
+        assert {f"/{place}/{entity}" for entity in logged} <= found
+        assert f"/{place}/tf/psm_right/tip_link" in found
+    assert "/cloud/current" not in found
+    assert [entry.application_id for entry in RrdReader(target).blueprints()] == [
+        "dnet servo, side by side"
+    ]
+
+
+def test_a_recording_beside_a_run_is_refused(tmp_path: Path) -> None:
+    run, recording = known_run(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", frames(2))
+    with (
+        EpisodeReader(run) as one,
+        EpisodeReader(recording) as other,
+        pytest.raises(BadEpisode, match="is no servo run"),
+    ):
+        replay_beside([one, other], tmp_path / "both.rrd")

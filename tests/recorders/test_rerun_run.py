@@ -1,4 +1,5 @@
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from dnet.errors import OccupiedOutput
 from dnet.recorders.rerun_run import RerunRun
 from dnet.recorders.viewer import RERUN
 from dnet.sim.urdf import psm_urdf
+from dnet.types import Goal, Latency
 from tests.recorders.rollout import ARMS, GRASP, frames, step
 from tests.recorders.rrd import entities, rows
 
@@ -69,12 +71,34 @@ def test_curves_are_in_millimetres(recording: Path) -> None:
     first = step(seen[0], seen[-1])
     chamfers = rows(recording, "/chamfer", "Scalars:scalars", timeline="step")
     motions = rows(recording, "/motion_length", "Scalars:scalars", timeline="step")
-    planning = rows(recording, "/planning", "Scalars:scalars", timeline="step")
     np.testing.assert_allclose([value[0] for _, value in chamfers], [1e3 * first.chamfer, 0])
     np.testing.assert_allclose(
         [value[0] for _, value in motions], [1e3 * float(np.linalg.norm(first.motion)), 0.0]
     )
-    assert planning == [(0.0, [1.5])]
+
+
+def test_a_run_of_which_all_is_known_shows_how_far_it_is_and_how_long_it_took(
+    tmp_path: Path,
+) -> None:
+    seen = frames(2)
+    end = seen[-1]
+    goal = Goal(end.cloud, "test", grasp=end.grasp, nodes=end.nodes, again=end.cloud)
+    with start(tmp_path / "run.rrd") as run:
+        run.log_target(goal)
+        for index, one in enumerate((seen[0], end)):
+            turn = replace(step(one, end), latency=Latency(1.0, 2.0, 3.0, 4.0, 5.0))
+            run.log_step(index, turn, TIPS)
+            run.log_latency(index, turn)
+        run.log_text("approach", time=0.2)
+    path = tmp_path / "run.rrd"
+    first, last = rows(path, "/cloud/current", "Points3D:colors", timeline="step")
+    assert len(set(first[1])) > len(set(last[1])) == 1
+    (arrow, _) = rows(path, "/motion/true", "Arrows3D:vectors", timeline="step")
+    np.testing.assert_allclose(arrow[1][0], end.grasp - seen[0].grasp, atol=1e-7)
+    latencies = rows(path, "/latency", "Scalars:scalars", timeline="step")
+    assert latencies == [(0.0, [1, 2, 3, 4, 5]), (1.0, [1, 2, 3, 4, 5])]
+    assert [time for time, _ in rows(path, "/log", "TextLog:text", timeline="sim_time")][1] == 0.2
+    assert rows(path, "/chamfer/floor", "Scalars:scalars", timeline="sim_time")
 
 
 def test_the_motion_is_an_arrow_from_the_grasp(recording: Path) -> None:
