@@ -7,7 +7,7 @@ from pathlib import Path
 from dnet.commands.inspect import Info, Inspect, List
 from dnet.commands.play import Play
 from dnet.commands.record import Record
-from dnet.commands.servo import Servo
+from dnet.commands.servo import Servo, ServoOptions
 from dnet.commands.train import Train
 
 EPOCHS = 1000
@@ -68,7 +68,7 @@ class Demo:
         steps.run(
             "servo",
             f"dnet servo --checkpoint {train} --goal {goal}:{frame} --out {servo}",
-            Servo(f"{goal}:{frame}", servo, checkpoint=train),
+            Servo(servo, goal=f"{goal}:{frame}", options=ServoOptions(checkpoint=train)),
         )
         run = servo / "run.mcap"
         steps.run("describe", f"dnet inspect info {run}", Inspect(Info(run)))

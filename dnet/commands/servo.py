@@ -1,46 +1,151 @@
-"""`dnet servo`: drive the object to a goal shape with a trained network."""
+"""`dnet servo`: drive the object to a goal shape, with a trained network or something else."""
 
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from dnet.trials.request import Trial
+    from dnet.types import Trace
 
-    from dnet.laboratory import Laboratory
-    from dnet.types import EpisodeMeta, FrameKind, Goal, Scene, Trace
+
+Controller = Literal["deformernet", "oracle", "none", "rrt"]
+
+
+@dataclass(frozen=True)
+class ServoOptions:
+    """How a run goes and when it ends."""
+
+    checkpoint: Path | None = None
+    """Directory that `dnet train` wrote, or one of its .safetensors files; the network that
+    ships, unless given."""
+    grasp: Literal["truth"] = "truth"
+    """What decides where the object is grasped: the point at which the goal was made."""
+    steps: int = 12
+    """Motions after which the run gives up: `out_of_steps`."""
+    threshold: float = 0.002
+    """The run has `converged` when the predicted motion is below this on every axis, in metres."""
+    chamfer: float = 0.0
+    """The goal is `reached` when the Chamfer distance to it is below this, in metres; 0: never."""
+    patience: int | None = None
+    """The run has `stalled` after so many motions that bring the object no nearer; 0: never. By
+    default 5; never for random trials."""
+    seconds: float = 0.0
+    """Seconds of simulation after which the run is `out_of_time`; 0: never."""
+    waypoints: int = 0
+    """Of each plan, go so many checked positions, 1 mm apart, and look again; 0: all of it."""
+    regrasp: int = 0
+    """How often to let go and grasp the object elsewhere when the run stalls."""
+    world: Literal["bullet", "quasistatic"] = "bullet"
+    """`bullet`: dynamics in PyBullet; `quasistatic`: equilibria of the same energy, found many
+    times as fast."""
+    depth_noise: float = 0.0
+    """Noise of the depth camera; 1 is that of a Kinect, 0 none."""
+    dropped: float = 0.0
+    """Share of the camera's images that are lost; three in a row, and the object is."""
+    occlusion: bool = True
+    """Whether the arms hide what is behind them from the camera."""
+    seed: int = 0
+    """Of everything drawn at random: planner, noise, random goals and trials."""
+
+    def trial(self, goal: str, out: Path, *, controller: Controller) -> "Trial":
+        """Return the run that these options ask for.
+
+        Raises:
+            DnetError: If an option is out of its range, or there is no such network.
+        """
+        from dnet.laboratory import LaboratorySettings
+        from dnet.perception.cloud import POINTS
+        from dnet.perception.noise import DepthNoise
+        from dnet.servo.verdict import ServoSettings
+        from dnet.trials.methods import network_points
+        from dnet.trials.request import Trial
+
+        self.check()
+        learned = controller == "deformernet"
+        patience = self.patience
+        if patience is None:
+            patience = 0 if controller == "rrt" else ServoSettings.patience
+        return Trial(
+            goal=goal,
+            out=out,
+            controller=controller,
+            checkpoint=self.checkpoint,
+            grasp=self.grasp,
+            settings=ServoSettings(
+                steps=self.steps,
+                threshold=self.threshold,
+                chamfer=self.chamfer,
+                patience=patience,
+                seconds=self.seconds,
+                waypoints=self.waypoints,
+                regrasps=self.regrasp,
+            ),
+            laboratory=LaboratorySettings(
+                points=network_points(self.checkpoint) if learned else POINTS,
+                world=self.world,
+                noise=DepthNoise(scale=self.depth_noise) if self.depth_noise else None,
+            ),
+            occlusion=self.occlusion,
+            dropped=self.dropped,
+            seed=self.seed,
+        )
+
+    def check(self) -> None:
+        """Raise if an option is out of its range."""
+        from dnet.errors import NotAFraction, TooFew
+
+        for what, value, least in (
+            ("--steps", self.steps, 1),
+            ("--threshold", self.threshold, 1e-6),
+            ("--chamfer", self.chamfer, 0),
+            ("--patience", self.patience or 0, 0),
+            ("--seconds", self.seconds, 0),
+            ("--waypoints", self.waypoints, 0),
+            ("--regrasp", self.regrasp, 0),
+            ("--depth-noise", self.depth_noise, 0),
+            ("--seed", self.seed, 0),
+        ):
+            if not value >= least:
+                raise TooFew(what, value, least)
+        if not 0.0 <= self.dropped <= 1.0:
+            raise NotAFraction("--dropped", self.dropped)
 
 
 @dataclass(frozen=True)
 class Servo:
     """Drive the object to a goal shape: observe, predict, plan, execute, again and again.
 
-    The goal is a frame of a recorded episode; the run starts from that episode's initial
-    configuration and grasps its true manipulation point. Each step plans a collision-free
-    motion (straight line first, RRT-Connect around what blocks it) and is written to OUT/run.mcap
-    and OUT/run.rrd: `dnet play OUT/run.rrd` shows the run.
+    The goal is a frame of a recorded episode, a cloud of your own, or drawn at random. The arm
+    grasps the object, and each step plans a collision-free motion (straight line first,
+    RRT-Connect around what blocks it). Everything is written to OUT/run.mcap, OUT/run.rrd and
+    OUT/latency.jsonl; `dnet play OUT` shows the run. However it ends, its outcome has a name, and
+    the arms stay where they are and hold what they hold.
 
     Example: dnet servo --goal data/episode-0-00003.mcap:7 --out servo
+
+    Example: dnet servo --goal random --seed 5 --controller oracle --world quasistatic --out servo
+
+    Example: dnet servo --goals data --jobs 2 --out runs
     """
 
-    goal: Annotated[str, tyro.conf.arg(metavar="EPISODE[:FRAME]")]
-    """Episode file and the number of the frame to reach; without a number, its last frame.
-    `dnet inspect info EPISODE` lists the frames."""
     out: Path
-    """Directory for the run; made if need be, must hold none yet."""
-    checkpoint: Path | None = None
-    """Directory that `dnet train` wrote, or one of its .safetensors files; the network that
-    ships, unless given."""
-    steps: int = 12
-    """Motions after which the run gives up."""
-    threshold: float = 0.002
-    """The goal counts as reached when the predicted motion is below this on every axis, in
-    metres."""
-    seed: int = 0
-    """Of the planner."""
+    """Directory for the run, or for one directory a run; made if need be."""
+    goal: Annotated[str | None, tyro.conf.arg(metavar="EPISODE[:FRAME]|CLOUD|random[:SEED]")] = None
+    """Episode file and the number of the frame to reach, by default its last; or a cloud (.npy,
+    .ply, .pcd; metres, world frame); or `random`, a displacement drawn as `dnet record` does."""
+    controller: Controller = "deformernet"
+    """What decides the motions: a trained network; the true displacement, known to the simulator
+    alone; nothing, which never moves; random trials, of which those that help are kept."""
+    goals: Annotated[Path | None, tyro.conf.arg(metavar="DIRECTORY")] = None
+    """A run for each episode (its last frame) and each cloud in it. Called again, it goes on."""
+    jobs: int = 1
+    """Processes for the runs of `--goals`."""
+    scene: Annotated[Path | None, tyro.conf.arg(metavar="EPISODE")] = None
+    """For a cloud: set the object down as in this episode; unless given, as the seed draws it."""
+    options: tyro.conf.OmitArgPrefixes[ServoOptions] = field(default_factory=ServoOptions)
 
     def run(self) -> None:
         """Run the loop, with a line for each step, and print how it ended.
@@ -49,101 +154,76 @@ class Servo:
             DnetError: If the checkpoint, the goal or the output directory will not do, or the
                 grasp is out of reach.
         """
+        from dnet.errors import OneOf
+
+        if (self.goal is None) == (self.goals is None):
+            raise OneOf("--goal", "--goals")
+        if self.goals is None:
+            self._run_one(str(self.goal))
+        else:
+            self._run_all(self.goals)
+
+    def _run_one(self, goal: str) -> None:
+        import threading
+        from dataclasses import replace
+
         from rich.console import Console
 
-        import dnet
-        from dnet.commands.servo_log import RECORDING, ServoLog
-        from dnet.laboratory import LaboratorySettings, laboratory
-        from dnet.servo.loop import ServoSettings, servo
-        from dnet.sim.observe import observe
+        from dnet.commands.stopping import stopping
+        from dnet.laboratory import laboratory
+        from dnet.trials.trial import run_trial
 
         self._check()
-        model = dnet.load(self.checkpoint)
-        goal, scene = self._read_goal(model.config.points)
+        trial = replace(
+            self.options.trial(goal, self.out, controller=self.controller), scene=self.scene
+        )
         console = Console()
-        with laboratory(LaboratorySettings(points=model.config.points)) as lab:
-            lab.world.reset(scene)
-            lab.world.settle()
-            kinds = _kinds()
-            with ServoLog(self.out, self._meta(lab, goal, scene), lab, console) as log:
-                log.start(goal)
-                trace = servo(
-                    lab.world,
-                    lambda: observe(lab.world, lab.see, next(kinds)),
-                    model,
-                    lab.planner,
-                    goal,
-                    settings=ServoSettings(steps=self.steps, threshold=self.threshold),
-                    seed=self.seed,
-                    watch=log.add,
-                )
-                log.finish(trace)
-        if trace.steps:
-            console.print(_summary(trace), highlight=False)
-        console.print(f"watch it with `dnet play {self.out / RECORDING}`", highlight=False)
+        asked = threading.Event()
+        with laboratory(trial.laboratory) as lab, stopping(asked.set):
+            trace = run_trial(trial, lab, say=lambda line: _print(console, line), stop=asked.is_set)
+        _print(console, summary(trace))
+        _print(console, f"watch it with `dnet play {self.out}`")
+        if trace.outcome == "interrupted":
+            raise KeyboardInterrupt
+
+    def _run_all(self, goals: Path) -> None:
+        from dnet.commands.servo_batch import run_batch
+        from dnet.trials.batch import goals_in
+
+        found = goals_in(goals)
+        run_batch(
+            [
+                self.options.trial(goal, self.out / name, controller=self.controller)
+                for name, goal in found
+            ],
+            jobs=self.jobs,
+            out=self.out,
+        )
 
     def _check(self) -> None:
-        from dnet.errors import OccupiedOutput, TooFew
+        from dnet.errors import OccupiedOutput
 
-        for what, value, least in (("--steps", self.steps, 1), ("--seed", self.seed, 0)):
-            if value < least:
-                raise TooFew(what, value, least)
-        if self.threshold <= 0:
-            raise TooFew("--threshold", self.threshold, 1e-6)
         if self.out.exists() and not self.out.is_dir():
             raise OccupiedOutput(self.out, "a file")
         held = sorted(self.out.glob("run.*"))
         if held:
             raise OccupiedOutput(self.out, f"a run ({held[0].name})")
 
-    def _read_goal(self, points: int) -> "tuple[Goal, Scene]":
-        from dnet.datasets.reader import EpisodeReader
-        from dnet.errors import BadCheckpoint
-        from dnet.types import Goal
-        from dnet.weights import DEFORMERNET
 
-        path, number = split_goal(self.goal)
-        with EpisodeReader(path) as episode:
-            frame = episode.frame(len(episode) - 1 if number is None else number)
-            if len(frame.cloud) != points:
-                raise BadCheckpoint(
-                    self.checkpoint or DEFORMERNET,
-                    f"takes clouds of {points} points, the goal has {len(frame.cloud)}",
-                    "use a network trained on clouds like the goal's",
-                )
-            source = f"{path.name}:{len(episode) - 1 if number is None else number}"
-            return Goal(frame.cloud.copy(), source), episode.meta.scene
+def _print(console: object, line: str) -> None:
+    from rich.console import Console
 
-    def _meta(self, lab: "Laboratory", goal: "Goal", scene: "Scene") -> "EpisodeMeta":
-        import dnet
-        from dnet.types import EpisodeMeta
-
-        name = f"servo-{goal.source.replace('.mcap:', '-')}"
-        checkpoint = self.checkpoint.name if self.checkpoint else f"dnet {dnet.__version__}"
-        run = {"goal": goal.source, "checkpoint": checkpoint}
-        settings = lab.settings.describe() | run
-        return EpisodeMeta(name, self.seed, 0, scene, settings)
+    if isinstance(console, Console):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
-def _kinds() -> "Iterator[FrameKind]":
-    """Yield what each frame of a run is: it starts from rest."""
-    yield "rest"
-    while True:
-        yield "shape"
-
-
-def _summary(trace: "Trace") -> str:
+def summary(trace: "Trace") -> str:
+    """Return one line on how a run went."""
     motions = sum(step.plan is not None for step in trace.steps)
-    first, last = trace.steps[0].chamfer, trace.steps[-1].chamfer
-    return (
-        f"{trace.outcome} after {motions} motions: "
-        f"Chamfer {first * 1e3:.2f} mm -> {last * 1e3:.2f} mm"
-    )
-
-
-def split_goal(goal: str) -> tuple[Path, int | None]:
-    """Return the episode and the frame of `EPISODE[:FRAME]`; None for no frame."""
-    match = re.fullmatch(r"(.+):(\d+)", goal)
-    if match and not Path(goal).exists():
-        return Path(match[1]), int(match[2])
-    return Path(goal), None
+    text = f"{trace.outcome} after {motions} motions"
+    if trace.reason:
+        text += f" ({trace.reason})"
+    if trace.steps:
+        first, last = trace.steps[0].chamfer, trace.steps[-1].chamfer
+        text += f": Chamfer {first * 1e3:.2f} mm -> {last * 1e3:.2f} mm"
+    return text

@@ -10,7 +10,6 @@ import pytest
 from safetensors.numpy import save_file
 
 from dnet.cli import main
-from dnet.commands.servo import split_goal
 from dnet.datasets.reader import EpisodeReader
 from dnet.geometry.chamfer import chamfer
 from dnet.recorders.episode import EpisodeWriter
@@ -72,8 +71,9 @@ def test_a_servo_run_is_an_episode_whose_figures_follow_from_its_clouds(demo: Pa
         with EpisodeReader(demo / "data" / source) as episode:
             np.testing.assert_array_equal(goal, episode.cloud(int(frame)))
             assert run.meta.scene == episode.meta.scene
-            # It starts from what the episode started from: the same rest shape, seen again.
-            np.testing.assert_array_equal(run.cloud(0), episode.cloud(0))
+            # It starts from what the episode started from: the same rest shape, grasped and seen
+            # again.
+            assert chamfer(run.cloud(0), episode.cloud(0)) < 1e-4
 
 
 def test_the_arm_goes_where_the_plans_say(demo: Path) -> None:
@@ -178,15 +178,3 @@ def test_training_over_a_run_is_refused(demo: Path) -> None:
     message = refusal("train", "--from-mcap", demo / "data", "--out", demo / "train")
     assert "already holds a run" in message
     assert (demo / "train" / "best.safetensors").read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    ("text", "path", "frame"),
-    [
-        ("a/b.mcap:7", "a/b.mcap", 7),
-        ("a/b.mcap", "a/b.mcap", None),
-        ("c:/b.mcap", "c:/b.mcap", None),
-    ],
-)
-def test_a_goal_is_a_file_and_perhaps_a_frame(text: str, path: str, frame: int | None) -> None:
-    assert split_goal(text) == (Path(path), frame)

@@ -1,0 +1,167 @@
+"""What a servo run leaves: an episode, a Rerun recording, latencies, and lines for people."""
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from dnet.errors import DiskAlmostFull
+from dnet.laboratory import Laboratory
+from dnet.recorders.episode import EpisodeWriter
+from dnet.recorders.rerun_run import RerunRun
+from dnet.recorders.step_text import describe_latency, describe_step
+from dnet.servo.grasping import Motion
+from dnet.sim.urdf import psm_urdf
+from dnet.trials.request import LATENCY, RECORDING, RUN
+from dnet.types import ARMS, EpisodeMeta, Goal, JointPath, Joints, Step, Trace
+
+RESERVE = 32_000_000
+"""Bytes that must be free before each step: enough to write it, and to end all files whole."""
+
+Say = Callable[[str], None]
+Free = Callable[[Path], int]
+
+
+def free_bytes(folder: Path) -> int:
+    """Return how much room the disk of a folder has."""
+    return shutil.disk_usage(folder).free
+
+
+class TrialLog:
+    """Writes each step to all of them while the run goes on."""
+
+    def __init__(
+        self,
+        out: Path,
+        meta: EpisodeMeta,
+        lab: Laboratory,
+        *,
+        say: Say,
+        recording: bool = True,
+        free: Free = free_bytes,
+    ) -> None:
+        """Start the files of a run.
+
+        Args:
+            out: Directory for them.
+            meta: What is known of the run.
+            lab: Where it happens.
+            say: Shows a line to people.
+            recording: Whether to write a Rerun recording.
+            free: Says how much room a folder has.
+
+        Raises:
+            OccupiedOutput: If there is a run already.
+            NoSpace: If there is no room for one.
+        """
+        self._out, self._arms, self._say, self._free = out, lab.arms, say, free
+        out.mkdir(parents=True, exist_ok=True)
+        self._check()
+        self._files = ExitStack()
+        self._episode = self._files.enter_context(
+            EpisodeWriter(
+                out / RUN,
+                meta,
+                arms=lab.arms,
+                attachments=lab.attachments(meta.scene.tissue),
+                camera=lab.settings.bullet.camera,
+            )
+        )
+        self._recording = None
+        if recording:
+            self._recording = self._files.enter_context(
+                RerunRun(out / RECORDING, name=meta.episode_id, arms=lab.arms, urdf=psm_urdf())
+            )
+        self._latencies = self._files.enter_context((out / LATENCY).open("w", encoding="utf-8"))
+
+    def __enter__(self) -> "TrialLog":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._files.__exit__(kind, error, trace)
+
+    def start(self, goal: Goal, motions: Sequence[Motion]) -> None:
+        """Write the shape to reach, and how the arm came to grasp the object."""
+        self._episode.set_goal(goal.cloud, again=goal.again, nodes=goal.nodes, grasp=goal.grasp)
+        if self._recording is not None:
+            self._recording.log_target(goal)
+        self.moved(motions)
+
+    def moved(self, motions: Sequence[Motion]) -> None:
+        """Write motions of the arm outside of the loop."""
+        for one in motions:
+            plan = one.plan
+            why = f" ({plan.reason})" if plan.reason else ""
+            self.note(f"{one.what}: plan {plan.status}{why}", time=one.time)
+            self._along(one.time + plan.times, one.joints[0], plan.path)
+
+    def note(self, text: str, *, time: float) -> None:
+        """Write a line for people, at `time`."""
+        self._episode.log(text, time=time, name="servo")
+        if self._recording is not None:
+            self._recording.log_text(text, time=time)
+
+    def add(self, index: int, step: Step) -> None:
+        """Write one step, and the way of the arm until the next.
+
+        Raises:
+            NoSpace: If the disk is nearly full: what is written could not be ended whole.
+        """
+        self._check()
+        self._episode.add_step(step, index)
+        if self._recording is None:
+            return
+        tips = None
+        if step.plan is not None:
+            tips = np.array([self._arms.tip(joints) for joints in step.plan.path])
+        self._recording.log_step(index, step, tips)
+        if step.plan is not None:
+            times = step.frame.time + step.plan.times
+            self._along(times, step.frame.joints[0], step.plan.path)
+
+    def timed(self, index: int, step: Step) -> None:
+        """Write how long a step took, and say all of it."""
+        self._say(f"{describe_step(step, index)}{describe_latency(step)}")
+        if step.latency is not None:
+            self._latencies.write(json.dumps({"step": index, **asdict(step.latency)}) + "\n")
+            self._latencies.flush()
+            if self._recording is not None:
+                self._recording.log_latency(index, step)
+
+    def finish(self, trace: Trace, result: dict[str, Any], *, time: float) -> None:
+        """Write how the run ended, and when: in seconds of simulation."""
+        if trace.last is not None:
+            self._episode.add(trace.last)
+            if self._recording is not None:
+                self._recording.log_frame(trace.last)
+        text = f"outcome: {trace.outcome}" + (f" ({trace.reason})" if trace.reason else "")
+        self.note(text, time=time)
+        chamfers = [step.chamfer for step in trace.steps]
+        self._episode.finish(
+            {"outcome": trace.outcome, "reason": trace.reason, "chamfer": chamfers, **result}
+        )
+
+    def _along(self, times: np.ndarray, holding: Joints, path: JointPath) -> None:
+        if self._recording is not None:
+            self._recording.arms_along(times, (np.tile(holding, (len(path), 1)), path))
+
+    def _check(self) -> None:
+        free = self._free(self._out)
+        if free < RESERVE:
+            raise DiskAlmostFull(self._out, free, RESERVE)
+
+
+def pose_of(joints: tuple[Joints, Joints]) -> dict[str, list[float]]:
+    """Return joint positions by arm, as JSON would have them."""
+    return {arm: positions.tolist() for arm, positions in zip(ARMS, joints, strict=True)}

@@ -1,0 +1,95 @@
+"""The controllers and the ways to choose a grasp by their names on the command line."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import dnet
+from dnet.errors import BadCheckpoint, UnknownTruth
+from dnet.laboratory import Laboratory
+from dnet.servo.controllers import Controller, Nothing, Oracle
+from dnet.servo.pickers import Picker, TruePoint
+from dnet.servo.random_trials import RandomTree
+from dnet.trials.goals import Task
+from dnet.trials.request import Trial
+from dnet.weights import DEFORMERNET
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a method may be made from."""
+
+    trial: Trial
+    task: Task
+    lab: Laboratory
+
+
+def _deformernet(setting: Setting) -> Controller:
+    trial = setting.trial
+    model = _network(trial.checkpoint)
+    points = len(setting.task.goal.cloud)
+    if points != model.config.points:
+        raise BadCheckpoint(
+            trial.checkpoint or DEFORMERNET,
+            f"takes clouds of {model.config.points} points, the goal has {points}",
+            "use a network trained on clouds like the goal's",
+        )
+    return model
+
+
+def _oracle(setting: Setting) -> Controller:
+    goal, world = setting.task.goal, setting.lab.world
+    if goal.grasp is None:
+        raise UnknownTruth("--controller oracle", goal.source)
+    return Oracle(lambda: world.tip, goal.grasp)
+
+
+def _none(setting: Setting) -> Controller:
+    del setting
+    return Nothing()
+
+
+def _rrt(setting: Setting) -> Controller:
+    trial, workspace = setting.trial, setting.lab.settings.workspace
+    return RandomTree(
+        lambda: setting.lab.world.tip,
+        low=np.array(workspace.displacement_low),
+        high=np.array(workspace.displacement_high),
+        # The last motion goes back to the best.
+        trials=max(trial.settings.steps - 1, 1),
+        seed=trial.seed,
+    )
+
+
+CONTROLLERS: Mapping[str, Callable[[Setting], Controller]] = {
+    "deformernet": _deformernet,
+    "oracle": _oracle,
+    "none": _none,
+    "rrt": _rrt,
+}
+"""By `ControllerName`."""
+
+
+def _truth(setting: Setting) -> Picker:
+    return TruePoint(np.array(setting.task.scene.manipulation_point))
+
+
+PICKERS: Mapping[str, Callable[[Setting], Picker]] = {"truth": _truth}
+"""By `GraspName`."""
+
+
+@lru_cache(maxsize=4)
+def _network(checkpoint: Path | None) -> "dnet.DeformerNet":
+    return dnet.load(checkpoint)
+
+
+def network_points(checkpoint: Path | None) -> int:
+    """Return how many points the clouds of a network have.
+
+    Raises:
+        BadCheckpoint: If there is no such network.
+    """
+    return _network(checkpoint).config.points
