@@ -37,7 +37,16 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    [["record"], ["train"], ["servo"], ["play"], ["inspect", "ls"], ["inspect", "info"], ["demo"]],
+    [
+        ["record"],
+        ["train"],
+        ["servo"],
+        ["play"],
+        ["inspect", "ls"],
+        ["inspect", "info"],
+        ["demo"],
+        ["evaluate", "servo"],
+    ],
 )
 def test_the_help_of_every_command_teaches_it(
     capsys: pytest.CaptureFixture[str], path: list[str]
@@ -130,6 +139,34 @@ def test_servoing_over_a_run_is_refused(capsys: pytest.CaptureFixture[str], tmp_
     )
     assert "already holds a run (run.rrd)" in message
     assert kept.read_bytes() == b"precious"
+
+
+def test_servoing_needs_one_goal_or_a_directory_of_them(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for goals in ((), ("--goal", "random", "--goals", tmp_path)):
+        message = refused(capsys, "servo", *goals, "--out", tmp_path / "run")
+        assert message == "dnet: give either --goal or --goals, and not both"
+    message = refused(capsys, "servo", "--goals", tmp_path, "--out", tmp_path / "run")
+    assert f"{tmp_path} holds no goal" in message
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--steps", 0),
+        ("--patience", -1),
+        ("--waypoints", -1),
+        ("--dropped", 1.5),
+        ("--chamfer", -1),
+    ],
+)
+def test_servoing_with_an_option_out_of_range_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, option: str, value: float
+) -> None:
+    message = refused(capsys, "servo", "--goal", "random", "--out", tmp_path, option, value)
+    assert f"{option} is {value}" in message
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("command", ["info", "ls"])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from dnet.commands.evaluate_grasp import Grasp
+from dnet.commands.evaluate_servo import ServoGoals
 from dnet.commands.train import Train
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure a network, methods that choose where to grasp, or what a choice in training is worth.
+    """Measure a network, ways to choose a grasp, servo runs, or what a choice in training is worth.
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
@@ -169,6 +170,7 @@ class Evaluate:
     experiment: tyro.conf.OmitSubcommandPrefixes[
         Annotated[Network, tyro.conf.subcommand("network")]
         | Annotated[Grasp, tyro.conf.subcommand("grasp")]
+        | Annotated[ServoGoals, tyro.conf.subcommand("servo")]
         | Annotated[Ablations, tyro.conf.subcommand("ablations")]
     ]
 
