@@ -35,7 +35,7 @@ Company = Literal["alone", "several"]
 """Whether a recording is seen by itself, or the viewer must list it with others."""
 
 SERVO_APPLICATION, RECORDING_APPLICATION = "dnet servo", "dnet record"
-COMPARISON_APPLICATION = "dnet servo, side by side"
+COMPARISON_APPLICATION = "dnet servo side by side"
 """Rerun shows all recordings of one application in one layout."""
 
 

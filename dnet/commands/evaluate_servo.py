@@ -9,6 +9,8 @@ import tyro
 from dnet.commands.servo import Controller, ServoOptions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dnet.evaluation.servo_scores import Score
     from dnet.trials.request import Trial
 
@@ -61,10 +63,10 @@ class ServoGoals:
         goals = self._goals()
         trials = [trial for name in self.controllers for trial in self._trials(name, goals)]
         scores = finish(trials, jobs=self.jobs, what="evaluating")
-        found = {
-            name: scores[number * len(goals) : (number + 1) * len(goals)]
+        found = [
+            (name, scores[number * len(goals) : (number + 1) * len(goals)])
             for number, name in enumerate(self.controllers)
-        }
+        ]
         # As it is written: a terminal of 80 columns has no room for it in a frame.
         print(self._write(found), end="")
 
@@ -84,13 +86,13 @@ class ServoGoals:
         trials = [replace(plain, goal=goal, recording=self.rrd) for goal in goals]
         return [replace(one, out=self.out / controller / one.goal_name) for one in trials]
 
-    def _write(self, found: "dict[Controller, list[Score]]") -> str:
+    def _write(self, found: "Sequence[tuple[str, list[Score]]]") -> str:
         import json
 
         from dnet.evaluation.servo_table import servo_frame, servo_table, summary
 
         table = servo_table(found)
-        figures = {name: summary(scores) for name, scores in found.items()}
+        figures = {name: summary(scores) for name, scores in found}
         for name, content in (
             ("servo.md", table),
             ("servo.csv", servo_frame(found).write_csv()),

@@ -21,8 +21,12 @@ class ServoOptions:
     checkpoint: Path | None = None
     """Directory that `dnet train` wrote, or one of its .safetensors files; the network that
     ships, unless given."""
-    grasp: Literal["truth"] = "truth"
-    """What decides where the object is grasped: the point at which the goal was made."""
+    grasp: Literal["truth", "regressor", "dense", "displaced"] = "truth"
+    """What decides where the object is grasped: the point at which the goal was made; a network
+    that answers with a position, or with a score for each point; the point farthest from the
+    goal."""
+    grasp_checkpoint: Path | None = None
+    """Network that chooses the grasp; the one that ships, unless given."""
     steps: int = 12
     """Motions after which the run gives up: `out_of_steps`."""
     threshold: float = 0.002
@@ -74,6 +78,7 @@ class ServoOptions:
             controller=controller,
             checkpoint=self.checkpoint,
             grasp=self.grasp,
+            grasp_checkpoint=self.grasp_checkpoint,
             settings=ServoSettings(
                 steps=self.steps,
                 threshold=self.threshold,

@@ -1,7 +1,7 @@
 """Servo runs compared: a table for people, and the same figures run by run for machines."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -24,18 +24,18 @@ COLUMNS = (
 )
 
 
-def servo_table(found: Mapping[str, Sequence[Score]]) -> str:
+def servo_table(found: Iterable[tuple[str, Sequence[Score]]]) -> str:
     """Return a Markdown table, a row a controller: medians, and shares of all runs.
 
     Args:
         found: The runs by what controlled them.
     """
     lines = [_row(COLUMNS), _row(["---"] * len(COLUMNS))]
-    lines += [_row(_cells(name, scores)) for name, scores in found.items()]
+    lines += [_row(_cells(name, scores)) for name, scores in found]
     return "\n".join(lines) + "\n"
 
 
-def servo_frame(found: Mapping[str, Sequence[Score]]) -> pl.DataFrame:
+def servo_frame(found: Iterable[tuple[str, Sequence[Score]]]) -> pl.DataFrame:
     """Return one row a run with all of its figures, distances in metres."""
     rows = [
         {
@@ -45,7 +45,7 @@ def servo_frame(found: Mapping[str, Sequence[Score]]) -> pl.DataFrame:
             "near": score.near,
             "most": score.most,
         }
-        for name, scores in found.items()
+        for name, scores in found
         for score in scores
     ]
     return pl.DataFrame(rows, infer_schema_length=None)

@@ -10,12 +10,16 @@ import numpy as np
 import dnet
 from dnet.errors import BadCheckpoint, UnknownTruth
 from dnet.laboratory import Laboratory
+from dnet.nets.deformernet import DeformerNet
+from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.servo.controllers import Controller, Nothing, Oracle
+from dnet.servo.grasp_pickers import MostDisplaced, NetworkPicker
 from dnet.servo.pickers import Picker, TruePoint
 from dnet.servo.random_trials import RandomTree
+from dnet.training.checkpoints import load_kind
 from dnet.trials.goals import Task
 from dnet.trials.request import Trial
-from dnet.weights import DEFORMERNET
+from dnet.weights import DEFORMERNET, DENSE, REGRESSOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +81,30 @@ def _truth(setting: Setting) -> Picker:
     return TruePoint(np.array(setting.task.scene.manipulation_point))
 
 
-PICKERS: Mapping[str, Callable[[Setting], Picker]] = {"truth": _truth}
+def _regressor(setting: Setting) -> Picker:
+    return NetworkPicker(load_kind(setting.trial.grasp_checkpoint or REGRESSOR, PointRegressor))
+
+
+def _dense(setting: Setting) -> Picker:
+    return NetworkPicker(load_kind(setting.trial.grasp_checkpoint or DENSE, DensePredictor))
+
+
+def _displaced(setting: Setting) -> Picker:
+    del setting
+    return MostDisplaced()
+
+
+PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
+    "truth": _truth,
+    "regressor": _regressor,
+    "dense": _dense,
+    "displaced": _displaced,
+}
 """By `GraspName`."""
 
 
 @lru_cache(maxsize=4)
-def _network(checkpoint: Path | None) -> "dnet.DeformerNet":
+def _network(checkpoint: Path | None) -> DeformerNet:
     return dnet.load(checkpoint)
 
 

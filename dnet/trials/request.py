@@ -11,8 +11,9 @@ from dnet.servo.verdict import ServoSettings
 ControllerName = Literal["deformernet", "oracle", "none", "rrt"]
 """`deformernet`: a trained network; `oracle`: knows the true motion; `none`: never moves; `rrt`:
 tries at random."""
-GraspName = Literal["truth"]
-"""`truth`: the point at which the goal was made."""
+GraspName = Literal["truth", "regressor", "dense", "displaced"]
+"""`truth`: the point at which the goal was made; `regressor`, `dense`: networks that answer with a
+position, or with a score for each point; `displaced`: the point farthest from the goal cloud."""
 
 RANDOM = "random"
 RUN = "run.mcap"
@@ -33,6 +34,8 @@ class Trial:
     checkpoint: Path | None = None
     """Of the network; None for the one that ships."""
     grasp: GraspName = "truth"
+    grasp_checkpoint: Path | None = None
+    """Of a network that chooses the grasp; None for the one that ships."""
     scene: Path | None = None
     """Episode whose scene a cloud file is a goal in; None draws one from the seed."""
     settings: ServoSettings = field(default_factory=ServoSettings)

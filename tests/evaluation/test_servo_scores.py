@@ -78,8 +78,8 @@ def test_runs_that_never_began_count(tmp_path: Path) -> None:
     assert figures["near"] == figures["most"] == 0.5
     assert figures["outcomes"] == {"converged": 1, "refused": 1}
     assert figures["last_mm"] == 1.0
-    assert "1 converged, 1 refused" in servo_table({"x": [score(), refused]})
-    assert servo_frame({"x": [score(), refused]}).height == 2
+    assert "1 converged, 1 refused" in servo_table([("x", [score(), refused])])
+    assert servo_frame([("x", [score(), refused])]).height == 2
 
 
 def test_near_and_most_are_measured_from_the_floor() -> None:

@@ -258,7 +258,7 @@ def test_runs_side_by_side_are_one_recording_with_a_place_for_each(tmp_path: Pat
         assert f"/{place}/tf/psm_right/tip_link" in found
     assert "/cloud/current" not in found
     assert [entry.application_id for entry in RrdReader(target).blueprints()] == [
-        "dnet servo, side by side"
+        "dnet servo side by side"
     ]
 
 

@@ -10,12 +10,12 @@ from dnet.types import Goal, Trace
 from tests.servo.slab import SHAPE, TARGET, Notes, Slab
 
 GOAL = Goal((SHAPE + TARGET).astype(np.float32), "test")
-BOX = {"low": np.full(3, -0.05), "high": np.full(3, 0.05)}
+LOW, HIGH = np.full(3, -0.05), np.full(3, 0.05)
 
 
 def explore(seed: int, trials: int) -> Trace:
     slab = Slab()
-    tree = RandomTree(lambda: slab.tip, **BOX, trials=trials, seed=seed)
+    tree = RandomTree(lambda: slab.tip, low=LOW, high=HIGH, trials=trials, seed=seed)
     settings = ServoSettings(steps=trials + 1, patience=0)
     around = Surroundings(slab, slab.look, tree, slab, Notes())
     return servo(around, GOAL, settings=settings, seed=0)

@@ -84,7 +84,7 @@ def test_the_oracle_reaches_what_was_drawn(lab: Laboratory, tmp_path: Path) -> N
         assert goal.again is not None
         assert goal.nodes is not None
         assert goal.grasp is not None
-        assert 0 < chamfer(goal.again, goal.cloud) < 2e-3
+        assert 0 < chamfer(goal.again, goal.cloud) < 3e-3
         np.testing.assert_allclose(run.nodes(len(run) - 1), goal.nodes, atol=1e-3)
         np.testing.assert_allclose(run.grasps[-1], goal.grasp, atol=1e-3)
         assert run.kinds[0] == "rest"
@@ -125,10 +125,12 @@ def test_a_grasp_that_is_lost(lab: Laboratory, tmp_path: Path) -> None:
 
 
 def test_an_object_that_is_out_of_view(lab: Laboratory, tmp_path: Path) -> None:
-    asked = trial(tmp_path, dropped=0.6, settings=ServoSettings(patience=0, steps=50), seed=1)
+    # Of the camera's images this seed loses three in a row after the second turn.
+    asked = trial(tmp_path, dropped=0.5, settings=ServoSettings(patience=0, steps=50), seed=8)
     trace = run_trial(asked, lab, say=silent, controller=Towards(UP / 4))
     check_whole(tmp_path, trace, lab, "object_lost")
     assert "3 images in a row" in trace.reason
+    assert len(trace.steps) == 2
 
 
 def test_an_object_that_was_never_in_view_is_refused(lab: Laboratory, tmp_path: Path) -> None:
