@@ -586,11 +586,11 @@ class Uneven(DnetError, ValueError):
 
 
 class OtherRun(DnetError, ValueError):
-    """A training that is to go on with other settings, or other data, than it began with."""
+    """Work that is to go on with other settings, or other data, than it began with."""
 
     def __init__(self, run: Path, name: str, before: object, now: object) -> None:
         super().__init__(
-            f"the training in {run} has {name} {_short(before)}, not {_short(now)}; "
+            f"the run in {run} has {name} {_short(before)}, not {_short(now)}; "
             "go on with the settings and the data that it began with, or choose another --out"
         )
 

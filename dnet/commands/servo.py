@@ -171,6 +171,7 @@ class Servo:
     def _run_one(self, goal: str) -> None:
         import threading
         from dataclasses import replace
+        from functools import partial
 
         from rich.console import Console
 
@@ -182,28 +183,27 @@ class Servo:
         trial = replace(
             self.options.trial(goal, self.out, controller=self.controller), scene=self.scene
         )
-        console = Console()
+        say = partial(Console().print, highlight=False, markup=False, soft_wrap=True)
         asked = threading.Event()
         with laboratory(trial.laboratory) as lab, stopping(asked.set):
-            trace = run_trial(trial, lab, say=lambda line: _print(console, line), stop=asked.is_set)
-        _print(console, summary(trace))
-        _print(console, f"watch it with `dnet play {self.out}`")
+            trace = run_trial(trial, lab, say=say, stop=asked.is_set)
+        say(summary(trace))
+        say(f"watch it with `dnet play {self.out}`")
         if trace.outcome == "interrupted":
             raise KeyboardInterrupt
 
     def _run_all(self, goals: Path) -> None:
+        from dataclasses import replace
+
         from dnet.commands.servo_batch import run_batch
         from dnet.trials.batch import goals_in
 
-        found = goals_in(goals)
-        run_batch(
-            [
-                self.options.trial(goal, self.out / name, controller=self.controller)
-                for name, goal in found
-            ],
-            jobs=self.jobs,
-            out=self.out,
-        )
+        plain = self.options.trial("", self.out, controller=self.controller)
+        trials = [
+            replace(plain, goal=goal, out=self.out / name, scene=self.scene)
+            for name, goal in goals_in(goals)
+        ]
+        run_batch(trials, jobs=self.jobs, out=self.out)
 
     def _check(self) -> None:
         from dnet.errors import OccupiedOutput
@@ -213,13 +213,6 @@ class Servo:
         held = sorted(self.out.glob("run.*"))
         if held:
             raise OccupiedOutput(self.out, f"a run ({held[0].name})")
-
-
-def _print(console: object, line: str) -> None:
-    from rich.console import Console
-
-    if isinstance(console, Console):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def summary(trace: "Trace") -> str:

@@ -5,6 +5,7 @@ ASCII and binary files. Open3D reads them too, but is 400 MB, and plyfile is und
 """
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -55,19 +56,18 @@ def _read_npy(path: Path) -> Any:
 
 
 def _read_ply(path: Path) -> Any:
-    try:
-        import trimesh  # noqa: PLC0415
-    except ImportError as error:
-        raise MissingExtra("trimesh", EXTRA, f"reading {path.name}") from error
-    return trimesh.load(path, process=False).vertices
+    return _package("trimesh", path).load(path, process=False).vertices
 
 
 def _read_pcd(path: Path) -> Any:
+    return _package("pypcd4", path).PointCloud.from_path(path).numpy(("x", "y", "z"))
+
+
+def _package(name: str, path: Path) -> Any:
     try:
-        import pypcd4  # noqa: PLC0415
+        return import_module(name)
     except ImportError as error:
-        raise MissingExtra("pypcd4", EXTRA, f"reading {path.name}") from error
-    return pypcd4.PointCloud.from_path(path).numpy(("x", "y", "z"))
+        raise MissingExtra(name, EXTRA, f"reading {path.name}") from error
 
 
 READERS: Mapping[str, Callable[[Path], Any]] = {

@@ -52,8 +52,12 @@ def goals_in(folder: Path) -> list[tuple[str, str]]:
 
 
 def missing(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the trials that are not finished."""
-    return [trial for trial in trials if not is_finished(trial.out)]
+    """Return the trials that are not finished.
+
+    Raises:
+        OtherRun: If a directory holds a run with other settings.
+    """
+    return [trial for trial in trials if not is_finished(trial)]
 
 
 def run_trials(trials: Sequence[Trial], *, jobs: int, stop: Callable[[], bool]) -> Iterator[Report]:

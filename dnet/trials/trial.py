@@ -11,7 +11,7 @@ import numpy as np
 
 import dnet
 from dnet.datasets.reader import EpisodeReader
-from dnet.errors import DnetError, NoGrasp, ShortCloud
+from dnet.errors import DnetError, NoGrasp, OtherRun, ShortCloud
 from dnet.laboratory import Laboratory
 from dnet.servo.controllers import Controller
 from dnet.servo.grasping import Hand
@@ -143,19 +143,25 @@ class _Grasping:
 
 def _meta(trial: Trial, task: Task, lab: Laboratory, point: Point) -> EpisodeMeta:
     name = f"servo-{task.goal.source.replace('.mcap:', '-').replace(':', '-')}"
-    checkpoint = trial.checkpoint.name if trial.checkpoint else f"dnet {dnet.__version__}"
-    run = {
+    settings = lab.settings.describe() | _asked(trial)
+    settings |= {
         "goal": task.goal.source,
+        "true_point": list(task.scene.manipulation_point),
+    }
+    return EpisodeMeta(name, trial.seed, 0, at(task.scene, point), settings)
+
+
+def _asked(trial: Trial) -> dict[str, Any]:
+    """Return what decides about a run besides its goal and its laboratory, as in JSON."""
+    checkpoint = trial.checkpoint.name if trial.checkpoint else f"dnet {dnet.__version__}"
+    return {
         "controller": trial.controller,
         "checkpoint": checkpoint if trial.controller == "deformernet" else None,
         "grasp": trial.grasp,
         "servo": asdict(trial.settings),
         "occlusion": trial.occlusion,
         "dropped": trial.dropped,
-        "true_point": list(task.scene.manipulation_point),
     }
-    scene = at(task.scene, point)
-    return EpisodeMeta(name, trial.seed, 0, scene, lab.settings.describe() | run)
 
 
 def _result(trace: Trace, grasping: _Grasping, lab: Laboratory) -> dict[str, Any]:
@@ -168,12 +174,21 @@ def _result(trace: Trace, grasping: _Grasping, lab: Laboratory) -> dict[str, Any
     }
 
 
-def is_finished(out: Path) -> bool:
-    """Return whether a directory holds a whole run."""
-    path = out / RUN
+def is_finished(trial: Trial) -> bool:
+    """Return whether the directory of a trial holds the whole run that it asks for.
+
+    Raises:
+        OtherRun: If it holds one with other settings.
+    """
+    path = trial.out / RUN
     if not path.is_file():
         return False
     with EpisodeReader(path) as run:
+        settings = run.meta.settings | {"seed": run.meta.seed}
+        asked = _asked(trial) | {"seed": trial.seed, "world": trial.laboratory.world}
+        for name, wanted in asked.items():
+            if settings.get(name) != wanted:
+                raise OtherRun(trial.out, name, settings.get(name), wanted)
         return run.finished and (run.result or {}).get("outcome") != "interrupted"
 
 

@@ -1,15 +1,16 @@
 """Clouds of other programs are read as they are, and refused where they are none."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pypcd4
 import pytest
-import trimesh
 
 from dnet.errors import BadCloudFile, MissingPath
 from dnet.perception.cloud_file import read_cloud
 
+PYPCD4: Any = pytest.importorskip("pypcd4")
+TRIMESH: Any = pytest.importorskip("trimesh")
 CLOUD = np.random.default_rng(0).uniform(-0.05, 0.05, (300, 3)).astype(np.float32)
 
 
@@ -18,11 +19,11 @@ def write(path: Path, cloud: np.ndarray, encoding: str) -> Path:
         np.save(path, cloud)
     elif path.suffix == ".ply":
         path.write_bytes(
-            trimesh.exchange.ply.export_ply(trimesh.PointCloud(cloud), encoding=encoding)
+            TRIMESH.exchange.ply.export_ply(TRIMESH.PointCloud(cloud), encoding=encoding)
         )
     else:
-        names = {"ascii": pypcd4.Encoding.ASCII, "binary": pypcd4.Encoding.BINARY}
-        pypcd4.PointCloud.from_xyz_points(cloud).save(path, encoding=names[encoding])
+        names = {"ascii": PYPCD4.Encoding.ASCII, "binary": PYPCD4.Encoding.BINARY}
+        PYPCD4.PointCloud.from_xyz_points(cloud).save(path, encoding=names[encoding])
     return path
 
 

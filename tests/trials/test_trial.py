@@ -10,7 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from dnet.datasets.reader import EpisodeReader
-from dnet.errors import DiskAlmostFull, ShortCloud, UnknownTruth
+from dnet.errors import DiskAlmostFull, OtherRun, ShortCloud, UnknownTruth
 from dnet.geometry.chamfer import chamfer
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
 from dnet.servo.verdict import ServoSettings
@@ -101,6 +101,17 @@ def test_the_same_seed_writes_the_same_bytes(lab: Laboratory, tmp_path: Path) ->
     assert one == two
 
 
+def test_a_run_with_other_settings_is_not_taken_for_this_one(
+    lab: Laboratory, tmp_path: Path
+) -> None:
+    asked = trial(tmp_path)
+    run_trial(asked, lab, say=silent)
+    assert is_finished(asked)
+    for other in (replace(asked, controller="none"), replace(asked, seed=9)):
+        with pytest.raises(OtherRun, match="choose another --out"):
+            is_finished(other)
+
+
 def test_a_motion_that_is_no_number(lab: Laboratory, tmp_path: Path) -> None:
     spoilt = Towards(np.full(3, np.nan))
     trace = run_trial(trial(tmp_path), lab, say=silent, controller=spoilt)
@@ -172,7 +183,7 @@ def test_a_run_that_is_stopped(lab: Laboratory, tmp_path: Path) -> None:
         stop=lambda: controller.calls >= 2,
     )
     check_whole(tmp_path, trace, lab, "interrupted")
-    assert not is_finished(tmp_path)
+    assert not is_finished(trial(tmp_path))
     clear(tmp_path)
     assert not list(tmp_path.iterdir())
 
