@@ -19,7 +19,7 @@ def run_batch(trials: "Sequence[Trial]", *, jobs: int, out: Path) -> None:
     from rich.table import Table
 
     scores = finish(trials, jobs=jobs, what="servoing")
-    table = Table("run", "outcome", "motions", "Chamfer (mm)", "floor", "nodes off (mm)")
+    table = Table("run", "outcome", "motions", "Chamfer (mm)", "floor", "nodes (mm)")
     for trial, score in zip(trials, scores, strict=True):
         table.add_row(
             trial.out.name,

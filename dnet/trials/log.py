@@ -21,6 +21,8 @@ from dnet.sim.urdf import psm_urdf
 from dnet.trials.request import LATENCY, RECORDING, RUN
 from dnet.types import ARMS, EpisodeMeta, Goal, JointPath, Joints, Step, Trace
 
+PICTURES = 20
+"""Of the moving arm in a Rerun recording, a second of simulation."""
 RESERVE = 32_000_000
 """Bytes that must be free before each step: enough to write it, and to end all files whole."""
 
@@ -153,8 +155,13 @@ class TrialLog:
         )
 
     def _along(self, times: np.ndarray, holding: Joints, path: JointPath) -> None:
-        if self._recording is not None:
-            self._recording.arms_along(times, (np.tile(holding, (len(path), 1)), path))
+        if self._recording is None:
+            return
+        # The links of each position take a millisecond: as many as the eye needs will do.
+        count = min(len(path), int(np.ceil((times[-1] - times[0]) * PICTURES)) + 1)
+        rows = np.unique(np.linspace(0, len(path) - 1, max(count, 1)).round().astype(int))
+        still = np.tile(holding, (len(rows), 1))
+        self._recording.arms_along(times[rows], (still, path[rows]))
 
     def _check(self) -> None:
         free = self._free(self._out)
