@@ -19,8 +19,8 @@ class ServoOptions:
     """How a run goes and when it ends."""
 
     checkpoint: Path | None = None
-    """Directory that `dnet train` wrote, or one of its .safetensors files; the network that
-    ships, unless given."""
+    """Directory that `dnet train` wrote, one of its .safetensors files, or an .onnx of `dnet
+    export`; the network that ships, unless given."""
     grasp: Literal["truth", "regressor", "dense", "displaced"] = "truth"
     """What decides where the object is grasped: the point at which the goal was made; a network
     that answers with a position, or with a score for each point; the point farthest from the

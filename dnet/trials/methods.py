@@ -12,6 +12,7 @@ from dnet.errors import BadCheckpoint, UnknownTruth
 from dnet.laboratory import Laboratory
 from dnet.nets.deformernet import DeformerNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
+from dnet.nets.onnx_network import OnnxDeformerNet
 from dnet.servo.controllers import Controller, Nothing, Oracle
 from dnet.servo.grasp_pickers import MostDisplaced, NetworkPicker
 from dnet.servo.pickers import Picker, TruePoint
@@ -104,8 +105,8 @@ PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
 
 
 @lru_cache(maxsize=4)
-def _network(checkpoint: Path | None) -> DeformerNet:
-    return dnet.load(checkpoint)
+def _network(checkpoint: Path | None) -> DeformerNet | OnnxDeformerNet:
+    return dnet.load() if checkpoint is None else dnet.load(checkpoint)
 
 
 def network_points(checkpoint: Path | None) -> int:
