@@ -23,7 +23,7 @@ from dnet.errors import (
 from dnet.recorders.episode import EpisodeWriter
 from dnet.recorders.rerun_run import RerunRun
 from dnet.sim.urdf import psm_urdf
-from tests.recorders.rollout import ARMS, GRASP, frame, frames, meta, step, write
+from tests.recorders.rollout import ARMS, GRASP, frame, frames, meta, step, write, write_servo
 from tests.recorders.rrd import rows
 
 
@@ -172,3 +172,24 @@ def test_a_folder_without_episodes_says_how_to_record(tmp_path: Path) -> None:
 def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownRecording):
         run(tmp_path / "a.png")
+
+
+def test_the_directories_of_two_runs_are_shown_side_by_side(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = [tmp_path / "one", tmp_path / "other"]
+    for folder in folders:
+        folder.mkdir()
+        write_servo(folder / "run.mcap")
+    run(*folders, "--save", tmp_path / "both.rrd")
+    assert capsys.readouterr().out.strip() == str(tmp_path / "both.rrd")
+    for place in ("run_1", "run_2"):
+        clouds = rows(
+            tmp_path / "both.rrd", f"/{place}/cloud/current", "Points3D:positions", timeline="frame"
+        )
+        assert len(clouds) == 3
+
+
+def test_a_run_without_a_recording_is_its_episode(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(b"")
+    assert playlist((tmp_path,), Choice(), Console()) == [tmp_path / "run.mcap"]
