@@ -66,6 +66,9 @@ class BulletWorld:
     on those before it.
     """
 
+    _start: Grasp
+    """What the arms hold, since the last reset."""
+
     def __init__(self, settings: BulletSettings | None = None) -> None:
         """Start a Bullet server of its own in this process."""
         self.settings = settings or BulletSettings()

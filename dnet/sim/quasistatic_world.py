@@ -15,6 +15,7 @@ from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.foresight import Foresight
 from dnet.sim.furniture import TABLE
 from dnet.sim.grasp import JAW_RADIUS, Grasp, at, grasp, slip
+from dnet.sim.quasistatic import QuasistaticSolver
 from dnet.sim.soft_picture import SoftPicture
 from dnet.sim.tetrahedra import Vertices
 from dnet.sim.world import Settling
@@ -30,6 +31,10 @@ class QuasistaticWorld:
     The shapes are those to which `BulletWorld` settles, found directly and many times faster.
     Bullet draws what the camera sees, and moves nothing.
     """
+
+    _grasp: Grasp
+    """What the arms hold, since the last reset."""
+    _solver: QuasistaticSolver
 
     def __init__(
         self,
