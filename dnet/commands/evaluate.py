@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from dnet.commands.evaluate_grasp import Grasp
+from dnet.commands.evaluate_importance import Importance
 from dnet.commands.evaluate_servo import ServoGoals
 from dnet.commands.train import Train
 
@@ -171,6 +172,7 @@ class Evaluate:
         Annotated[Network, tyro.conf.subcommand("network")]
         | Annotated[Grasp, tyro.conf.subcommand("grasp")]
         | Annotated[ServoGoals, tyro.conf.subcommand("servo")]
+        | Annotated[Importance, tyro.conf.subcommand("importance")]
         | Annotated[Ablations, tyro.conf.subcommand("ablations")]
     ]
 

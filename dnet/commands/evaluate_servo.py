@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dnet.commands.servo import Controller, ServoOptions
+from dnet.commands.servo import Controller, Grasp, ServoOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,6 +39,9 @@ class ServoGoals:
     repeated."""
     controllers: tuple[Controller, ...] = ("none", "deformernet", "oracle")
     """What to compare."""
+    grasps: tuple[Grasp, ...] = ()
+    """Ways to choose the grasp, each with every controller; the one that --grasp names, unless
+    given."""
     jobs: int = 1
     """Processes."""
     first_seed: int = 1_000_000
@@ -61,11 +64,12 @@ class ServoGoals:
         if self.goals < 1:
             raise TooFew("--goals", self.goals, 1)
         goals = self._goals()
-        trials = [trial for name in self.controllers for trial in self._trials(name, goals)]
+        methods = self._methods()
+        trials = [trial for method in methods for trial in self._trials(*method, goals)]
         scores = finish(trials, jobs=self.jobs, what="evaluating")
         found = [
-            (name, scores[number * len(goals) : (number + 1) * len(goals)])
-            for number, name in enumerate(self.controllers)
+            (self._name(*method), scores[number * len(goals) : (number + 1) * len(goals)])
+            for number, method in enumerate(methods)
         ]
         # As it is written: a terminal of 80 columns has no room for it in a frame.
         print(self._write(found), end="")
@@ -79,12 +83,21 @@ class ServoGoals:
         wanted = [one.strip() for some in self.episode for one in some.split(",") if one.strip()]
         return draw_goals(self.from_mcap, wanted, count=self.goals, seed=self.options.seed)
 
-    def _trials(self, controller: Controller, goals: list[str]) -> "list[Trial]":
+    def _methods(self) -> list[tuple[Controller, Grasp]]:
+        grasps = self.grasps or (self.options.grasp,)
+        return [(controller, grasp) for controller in self.controllers for grasp in grasps]
+
+    def _name(self, controller: Controller, grasp: Grasp) -> str:
+        """Return what a method is called in the table, and its folder."""
+        return controller if grasp == "truth" else f"{controller}-{grasp}"
+
+    def _trials(self, controller: Controller, grasp: Grasp, goals: list[str]) -> "list[Trial]":
         from dataclasses import replace
 
-        plain = self.options.trial("", self.out, controller=controller)
+        plain = replace(self.options.trial("", self.out, controller=controller), grasp=grasp)
+        folder = self.out / self._name(controller, grasp)
         trials = [replace(plain, goal=goal, recording=self.rrd) for goal in goals]
-        return [replace(one, out=self.out / controller / one.goal_name) for one in trials]
+        return [replace(one, out=folder / one.goal_name) for one in trials]
 
     def _write(self, found: "Sequence[tuple[str, list[Score]]]") -> str:
         import json

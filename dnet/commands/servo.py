@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 
 Controller = Literal["deformernet", "oracle", "none", "rrt"]
+Grasp = Literal["truth", "regressor", "dense", "displaced", "farthest"]
 
 
 @dataclass(frozen=True)
@@ -21,10 +22,10 @@ class ServoOptions:
     checkpoint: Path | None = None
     """Directory that `dnet train` wrote, one of its .safetensors files, or an .onnx of `dnet
     export`; the network that ships, unless given."""
-    grasp: Literal["truth", "regressor", "dense", "displaced"] = "truth"
+    grasp: Grasp = "truth"
     """What decides where the object is grasped: the point at which the goal was made; a network
     that answers with a position, or with a score for each point; the point farthest from the
-    goal."""
+    goal; or the one farthest from the truth, as bad as can be."""
     grasp_checkpoint: Path | None = None
     """Network that chooses the grasp; the one that ships, unless given."""
     steps: int = 12

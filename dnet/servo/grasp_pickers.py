@@ -70,6 +70,19 @@ class MostDisplaced:
         return Choice(_point(initial, int(distances.argmax())), 0.0, distances)
 
 
+@dataclass(frozen=True)
+class FarthestPoint:
+    """Grasps the point of the cloud that is farthest from the true one: what a bad grasp costs."""
+
+    truth: Point
+
+    def pick(self, initial: Cloud, goal: Cloud) -> Choice:
+        """Return the manipulation point."""
+        del goal
+        distances = np.linalg.norm(initial - self.truth, axis=1)
+        return Choice(_point(initial, int(distances.argmax())), 0.0, distances)
+
+
 @dataclass
 class RandomPoint:
     """Grasps any point of the initial cloud: what every method must beat."""

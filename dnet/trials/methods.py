@@ -14,7 +14,7 @@ from dnet.nets.deformernet import DeformerNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.onnx_network import OnnxDeformerNet
 from dnet.servo.controllers import Controller, Nothing, Oracle
-from dnet.servo.grasp_pickers import MostDisplaced, NetworkPicker
+from dnet.servo.grasp_pickers import FarthestPoint, MostDisplaced, NetworkPicker
 from dnet.servo.pickers import Picker, TruePoint
 from dnet.servo.random_trials import RandomTree
 from dnet.training.checkpoints import load_kind
@@ -95,11 +95,16 @@ def _displaced(setting: Setting) -> Picker:
     return MostDisplaced()
 
 
+def _farthest(setting: Setting) -> Picker:
+    return FarthestPoint(np.array(setting.task.scene.manipulation_point))
+
+
 PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
     "truth": _truth,
     "regressor": _regressor,
     "dense": _dense,
     "displaced": _displaced,
+    "farthest": _farthest,
 }
 """By `GraspName`."""
 
