@@ -668,3 +668,13 @@ class OneOf(DnetError, ValueError):
 
     def __init__(self, one: str, other: str) -> None:
         super().__init__(f"give either {one} or {other}, and not both")
+
+
+class OutOfReach(DnetError, ValueError):
+    """A cloud of which no point can be grasped."""
+
+    def __init__(self, points: int) -> None:
+        super().__init__(
+            f"none of {points} points of the initial cloud faces the moving arm and lies beyond "
+            "the holding arm's clearance; turn the object, or choose a smaller clearance"
+        )

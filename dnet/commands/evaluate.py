@@ -9,6 +9,7 @@ import tyro
 from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.evaluate_importance import Importance
 from dnet.commands.evaluate_servo import ServoGoals
+from dnet.commands.evaluate_keypoints import EvaluateKeypoints
 from dnet.commands.train import Train
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure a network, ways to choose a grasp, servo runs, or what a choice in training is worth.
+    """Measure a network, keypoints, ways to grasp, servo runs, or what a choice in training is worth.
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
@@ -173,6 +174,7 @@ class Evaluate:
         | Annotated[Grasp, tyro.conf.subcommand("grasp")]
         | Annotated[ServoGoals, tyro.conf.subcommand("servo")]
         | Annotated[Importance, tyro.conf.subcommand("importance")]
+        | Annotated[EvaluateKeypoints, tyro.conf.subcommand("keypoints")]
         | Annotated[Ablations, tyro.conf.subcommand("ablations")]
     ]
 

@@ -1,0 +1,103 @@
+"""Where to grasp: near the keypoints that the goal displaces most (section III of the paper)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float32
+from scipy.spatial import cKDTree
+
+from dnet.errors import NoDisplacement, OutOfReach
+from dnet.geometry.chamfer import chamfer
+from dnet.nets.keypoints import Keypoints
+from dnet.servo.pickers import Choice
+from dnet.servo.reach import reachable
+from dnet.sim.scenes import Workspace
+from dnet.types import Cloud, Point
+
+FindKeypoints = Callable[[Cloud, Cloud], Keypoints]
+"""From an initial and a goal cloud to keypoints in both."""
+
+
+@dataclass(frozen=True)
+class KeypointChoice:
+    """A manipulation point, and what it was chosen by."""
+
+    point: Point
+    """Where to grasp: a point of the initial cloud, in metres."""
+    keypoints: Keypoints
+    """The object's keypoints in both clouds."""
+    displacement: Float32[np.ndarray, "k"]
+    """How far each keypoint moves, in metres."""
+    weights: Float32[np.ndarray, "k"]
+    """How much each keypoint counts; they sum to 1."""
+    confidence: float
+    """Share of the difference between the clouds that the keypoints explain, from 0 to 1: one
+    less the Chamfer distance that is left over that which was there."""
+
+
+@dataclass(frozen=True)
+class DisplacementHeuristic:
+    """Grasps the mean of the most displaced keypoints, each weighing what it is displaced by."""
+
+    find: FindKeypoints
+    """Finds keypoints, as `KeypointNet.keypoints` does."""
+    most: int = 20
+    """How many keypoints count, of those that the gripper can reach: as in the paper."""
+    least: float = 0.003
+    """Displacement of the most displaced keypoint below which the goal is reached already, in
+    metres."""
+    workspace: Workspace = field(default_factory=Workspace)
+    """Where the gripper can reach."""
+
+    def choose(self, initial: Cloud, goal: Cloud) -> KeypointChoice:
+        """Return where to grasp an object to bring it from its initial to its goal shape.
+
+        The mean lies inside the object; the nearest point of the cloud that the gripper can reach
+        is taken.
+
+        Args:
+            initial: What is seen of the object before any motion, (n, 3).
+            goal: What should be seen, (m, 3).
+
+        Raises:
+            NoDisplacement: If hardly anything moves.
+            OutOfReach: If no point of the initial cloud can be reached.
+            ShortCloud: If a cloud has too few points.
+            BadCloud: If a coordinate is NaN or infinite.
+        """
+        return self.choose_by(self.find(initial, goal), initial, goal)
+
+    def pick(self, initial: Cloud, goal: Cloud) -> Choice:
+        """Return the point of `choose` and how sure it is; raise as that does."""
+        chosen = self.choose(initial, goal)
+        return Choice(chosen.point, chosen.confidence)
+
+    def choose_by(self, keypoints: Keypoints, initial: Cloud, goal: Cloud) -> KeypointChoice:
+        """Return where to grasp by keypoints that are known already; raise as `choose` does."""
+        displacement = np.linalg.norm(keypoints.goal - keypoints.initial, axis=1)
+        within = reachable(initial, self.workspace)
+        surface = initial[within]
+        if not len(surface):
+            raise OutOfReach(len(initial))
+        _, own = cKDTree(initial).query(keypoints.initial)
+        # A few keypoints may have no one within reach: then all may count.
+        counted = within[own] if within[own].any() else np.ones(len(displacement), bool)
+        farthest = float(displacement[counted].max())
+        if farthest < self.least:
+            raise NoDisplacement("the most displaced keypoint is", farthest, self.least)
+        weights = top_weights(np.where(counted, displacement, 0.0), self.most)
+        away = np.linalg.norm(surface - weights @ keypoints.initial, axis=1)
+        point = surface[away.argmin()].astype(np.float64)
+        before = max(chamfer(initial, goal), float(np.finfo(np.float32).tiny))
+        confidence = max(0.0, 1.0 - keypoints.residual / before)
+        return KeypointChoice(point, keypoints, displacement, weights, confidence)
+
+
+def top_weights(displacement: Float32[np.ndarray, "k"], most: int) -> Float32[np.ndarray, "k"]:
+    """Return the displacements of the `most` greatest, scaled to sum to 1, and 0 for the others."""
+    weights = np.zeros_like(displacement)
+    # Stable: of keypoints equally displaced the first ones count.
+    top = np.argsort(-displacement, kind="stable")[:most]
+    weights[top] = displacement[top]
+    return weights / weights.sum()

@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dnet.errors import NoDisplacement, OutOfReach
+from dnet.geometry.sampling import farthest_points
+from dnet.nets.keypoints import Keypoints
+from dnet.servo.displacement_heuristic import DisplacementHeuristic, top_weights
+from dnet.sim.scenes import Workspace
+from dnet.types import Cloud
+
+CENTRE = np.array([0.02, 0.01, 0.04])
+
+
+def slab() -> Cloud:
+    """The upper side of a box at rest, seen from above."""
+    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 41), np.linspace(-0.05, 0.05, 41))
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.04)]).astype(np.float32)
+
+
+def bumped(points: Cloud, height: float = 0.03) -> Cloud:
+    """The same, pulled up at one point."""
+    away = np.linalg.norm(points[:, :2] - CENTRE[:2], axis=1)
+    lift = height * np.exp(-((away / 0.03) ** 2))
+    return (points + lift[:, None] * np.array([0.0, 0.0, 1.0])).astype(np.float32)
+
+
+def true_keypoints(initial: Cloud, goal: Cloud) -> Keypoints:
+    """What a perfect network would find of the bump."""
+    points = farthest_points(initial, 200)
+    return Keypoints(points, bumped(points), 0.0)
+
+
+def unmoved(initial: Cloud, goal: Cloud) -> Keypoints:
+    return Keypoints(initial[:200], initial[:200], 0.0)
+
+
+@pytest.mark.parametrize("most", [3, 10, 20])
+def test_the_point_that_was_pulled_is_found(most: int) -> None:
+    found = DisplacementHeuristic(true_keypoints, most).choose(slab(), bumped(slab()))
+    assert np.linalg.norm(found.point - CENTRE) < 0.005
+    assert found.confidence == 1.0
+
+
+def test_a_choice_tells_what_it_was_made_by() -> None:
+    found = DisplacementHeuristic(true_keypoints, 10).choose(slab(), bumped(slab()))
+    moved = np.linalg.norm(found.keypoints.goal - found.keypoints.initial, axis=1)
+    np.testing.assert_allclose(found.displacement, moved)
+    assert np.count_nonzero(found.weights) == 10
+    assert found.weights[moved.argmax()] == found.weights.max()
+    assert found.weights.sum() == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_point_lies_on_the_surface_within_reach() -> None:
+    cloud = slab()
+    far = DisplacementHeuristic(true_keypoints, 3, workspace=Workspace(clearance=0.09))
+    found = far.choose(cloud, bumped(cloud))
+    assert found.point[0] >= cloud[:, 0].min() + 0.09 - 1e-6
+    assert found.point.astype(np.float32).tolist() in cloud.tolist()
+
+
+def test_without_displacement_there_is_no_answer() -> None:
+    with pytest.raises(
+        NoDisplacement, match=r"is 0\.0 mm from the initial shape, need at least 3\.0 mm"
+    ):
+        DisplacementHeuristic(unmoved).choose(slab(), slab())
+
+
+def test_an_object_out_of_reach_is_refused() -> None:
+    heuristic = DisplacementHeuristic(true_keypoints, workspace=Workspace(clearance=0.2))
+    with pytest.raises(OutOfReach, match="none of 1681 points"):
+        heuristic.choose(slab(), bumped(slab()))
+
+
+def test_confidence_is_the_share_of_the_difference_that_is_explained() -> None:
+    initial, goal = slab(), bumped(slab())
+
+    def nothing_explained(initial: Cloud, goal: Cloud) -> Keypoints:
+        found = true_keypoints(initial, goal)
+        return Keypoints(found.initial, found.goal, 1.0)
+
+    assert DisplacementHeuristic(nothing_explained).choose(initial, goal).confidence == 0.0
+
+
+@given(
+    lengths=st.lists(st.floats(2**-10, 1.0, width=32), min_size=3, max_size=30),
+    most=st.integers(1, 40),
+)
+def test_weights_are_the_greatest_displacements_in_proportion(
+    lengths: list[float], most: int
+) -> None:
+    displacement = np.array(lengths, np.float32)
+    weights = top_weights(displacement, most)
+    assert weights.sum() == pytest.approx(1.0, abs=1e-5)
+    counted = np.flatnonzero(weights)
+    assert len(counted) == min(most, len(lengths))
+    others = np.setdiff1d(np.arange(len(lengths)), counted)
+    assert displacement[others].max(initial=0) <= displacement[counted].min()
+    ratio = weights[counted] / displacement[counted]
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-4)
