@@ -8,8 +8,8 @@ import tyro
 
 from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.evaluate_importance import Importance
-from dnet.commands.evaluate_servo import ServoGoals
 from dnet.commands.evaluate_keypoints import EvaluateKeypoints
+from dnet.commands.evaluate_servo import ServoGoals
 from dnet.commands.train import Train
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure a network, keypoints, ways to grasp, servo runs, or what a choice in training is worth.
+    """Measure a network, keypoints, ways to grasp, servo runs, or choices in training.
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """

@@ -11,7 +11,7 @@ from dnet.nets.keypoints import Keypoints, in_own_order
 from dnet.types import Cloud
 
 COUNT = 200
-"""Keypoints, as in the paper."""
+"""Keypoints, as in the paper; of a cloud with fewer points, all of them."""
 TURNS = 30
 """Most turns of iterative closest points; it comes to rest before."""
 AT_REST = 1e-6
@@ -73,7 +73,9 @@ def coherent(initial: Cloud, goal: Cloud) -> Keypoints:
     return Keypoints(source[:COUNT], carried[:COUNT], chamfer(carried, target))
 
 
-def _sample(cloud: Cloud, count: int = COUNT) -> Float32[np.ndarray, "_ 3"]:
+def _sample(cloud: Cloud, most: int = COUNT) -> Float32[np.ndarray, "_ 3"]:
+    """Return the points of a cloud that lie farthest from each other, `most` or all of them."""
+    count = min(most, len(cloud))
     return in_own_order(cloud, len(cloud), least=count)[:count]
 
 
