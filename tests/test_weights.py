@@ -1,4 +1,4 @@
-"""The network that ships: whole, small, with a card, and good on what it has never seen."""
+"""The networks that ship: whole, small, with a card, and good on what they have never seen."""
 
 import json
 import re
@@ -8,12 +8,11 @@ import pytest
 
 import dnet
 from dnet.commands.evaluate import Evaluate, Network
+from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.record import Record
 from dnet.errors import BadCheckpoint
 from dnet.training.checkpoints import read_metrics
-from dnet.weights import DEFORMERNET
-
-CARD = DEFORMERNET.with_name("MODEL_CARD.md")
+from dnet.weights import DEFORMERNET, DENSE, REGRESSOR
 
 
 def test_it_is_small_enough_to_ship_and_loads_without_a_path() -> None:
@@ -24,7 +23,7 @@ def test_it_is_small_enough_to_ship_and_loads_without_a_path() -> None:
 
 
 def test_its_card_tells_the_same_epoch_as_its_file() -> None:
-    text = CARD.read_text(encoding="utf-8")
+    text = DEFORMERNET.with_suffix(".md").read_text(encoding="utf-8")
     metrics = read_metrics(DEFORMERNET)
     assert f"**Best epoch**: {metrics['epoch']} of " in text
     rows = [line for line in text.splitlines() if line.startswith("| unseen")]
@@ -46,6 +45,33 @@ def test_it_predicts_the_motions_of_an_episode_that_it_has_never_seen(
     errors = json.loads(capsys.readouterr().out)["any_pair"]
     assert errors["pairs"] == 72
     assert errors["mse_mm2"] < errors["zero_mse_mm2"] / 30
+
+
+@pytest.mark.parametrize("weights", [REGRESSOR, DENSE])
+def test_networks_that_choose_a_grasp_are_small_and_have_cards_of_the_same_epoch(
+    weights: Path,
+) -> None:
+    assert weights.stat().st_size < 8_000_000
+    metrics = read_metrics(weights)
+    text = weights.with_suffix(".md").read_text(encoding="utf-8")
+    assert f"**Best epoch**: {metrics['epoch']} of " in text
+    (row,) = [line for line in text.splitlines() if line.startswith("| unseen episodes")]
+    told = float(row.split("|")[6])
+    found = metrics["unseen_episodes"]["from_rest"]["mean_mm"]
+    assert told == pytest.approx(found, rel=0.1)
+
+
+def test_grasps_are_chosen_nearer_to_the_truth_than_without_learning(tmp_path: Path) -> None:
+    Record(tmp_path / "data", pairs=4, shapes=5, seed=977, world="quasistatic").run()
+    Evaluate(Grasp(tmp_path / "data", tmp_path / "out", cases=20, validation=1.0)).run()
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:]]
+        for line in (tmp_path / "out" / "grasp.md").read_text().splitlines()[2:]
+    ]
+    means = {row[0]: float(row[2]) for row in rows}
+    for method in ("regressor", "dense"):
+        assert means[method] < means["most displaced point"]
+        assert means[method] < 0.6 * means["random point"]
 
 
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:

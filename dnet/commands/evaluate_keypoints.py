@@ -45,6 +45,8 @@ class EvaluateKeypoints:
         Raises:
             DnetError: If the network or the episodes will not do.
         """
+        from functools import partial
+
         import numpy as np
         from rich.console import Console
         from rich.markdown import Markdown
@@ -55,8 +57,9 @@ class EvaluateKeypoints:
         from dnet.errors import TooFew
         from dnet.evaluation.keypoints import judge, read_cases, table_of
         from dnet.evaluation.registration import coherent, rigid, unmoved
+        from dnet.nets.keypoints import KeypointNet
         from dnet.servo.displacement_heuristic import FindKeypoints
-        from dnet.training.keypoint_weights import load_keypoint_net
+        from dnet.training.checkpoints import load_kind
 
         if self.cases < 1:
             raise TooFew("--cases", self.cases, 1)
@@ -66,7 +69,7 @@ class EvaluateKeypoints:
         if self.drift:
             methods["coherent point drift"] = coherent
         if self.checkpoint is not None:
-            methods["learned"] = load_keypoint_net(self.checkpoint).keypoints
+            methods["learned"] = load_kind(self.checkpoint, KeypointNet).keypoints
         console = Console(stderr=True)
         places = self._held_out(read_index(as_place(self.from_mcap), console))
         cases = list(read_cases(places, self.cases, random=np.random.default_rng(self.seed)))
@@ -79,7 +82,7 @@ class EvaluateKeypoints:
                     cases,
                     most=self.most,
                     random=np.random.default_rng(self.seed),
-                    on_case=lambda task=task: bar.advance(task),
+                    on_case=partial(bar.advance, task),
                 )
         Console().print(Markdown(table_of(scores)))
         print(f"{len(cases)} cases from {len(places)} episodes, M = {self.most}")

@@ -47,18 +47,19 @@ class Train:
     """Episodes of `dnet record`, two or more; read from where they lie, be it an object store."""
     out: Path
     """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
-    model: Literal["deformernet", "grasp", "dense"] = "deformernet"
+    model: Literal["deformernet", "grasp", "dense", "keypoints"] = "deformernet"
     """`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
-    `dense`: where to grasp, as a score for each point."""
+    `dense`: where to grasp, as a score for each point; `keypoints`: which point is which, from
+    clouds alone."""
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
     weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped|random")] = None
     """What to begin with: a run, a .safetensors file, the DeformerNet that `shipped`, or `random`
-    weights. A DeformerNet begins with random ones, unless given; the models that choose where to
-    grasp with what a DeformerNet knows: `grasp` takes its encoder, `dense` all of it, and both
-    train it on. Options of the network must be those that it has."""
+    weights. A DeformerNet begins with random ones, unless given, the others with what a
+    DeformerNet knows: `dense` with all of it, `grasp` and `keypoints` with its encoder. Options
+    of the network must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""

@@ -14,7 +14,7 @@ That distances between neighbours persist on a deforming body is SelfGeo (Zohaib
 that a displacement is a sum of fields over space times what is sensed, DeepONet (Lu et al. 2021).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -34,24 +34,11 @@ FITTED = 1024
 """Points of the initial cloud that are carried to the goal and fitted to it."""
 
 
-@dataclass(frozen=True, slots=True)
-class KeypointNetConfig:
-    """All that is needed to build a network, its weights aside."""
-
-    cloud: DeformerNetConfig = field(default_factory=DeformerNetConfig)
-    """How the network sees a cloud: its encoder is that of DeformerNet."""
-    keypoints: int = 200
-    """Keypoints of an object, as in the paper."""
-    fields: int = 64
-    """Smooth fields over the object that a displacement is made of."""
-    width: int = 64
-    """Channels of the layers that make the fields; those that weigh them are twice as wide."""
-
-    def __post_init__(self) -> None:
-        if self.keypoints < 1:
-            raise TooFew("number of keypoints", self.keypoints, 1)
-        if self.cloud.points < self.keypoints:
-            raise TooFew("points of a cloud with keypoints", self.cloud.points, self.keypoints)
+KEYPOINTS = 200
+"""Keypoints of an object, as in the paper."""
+FIELDS, WIDTH = 96, 96
+"""Smooth fields over the object that a displacement is made of, and channels of the layers that
+make them; those that weigh them are twice as wide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,13 +101,21 @@ class Carrier(nn.Module):
 
 
 class KeypointNet(nn.Module):
-    """An encoder for clouds, and a carrier that moves points as the object deforms."""
+    """An encoder for clouds, and a carrier that moves points as the object deforms.
 
-    def __init__(self, config: KeypointNetConfig | None = None) -> None:
+    Args:
+        config: How the network sees a cloud: its encoder is that of DeformerNet.
+        count: Keypoints of an object; at most as many as a cloud has points.
+    """
+
+    def __init__(self, config: DeformerNetConfig | None = None, *, count: int = KEYPOINTS) -> None:
         super().__init__()
-        self.config = config or KeypointNetConfig()
-        self.encoder = Encoder(self.config.cloud.norm, density=self.config.cloud.density)
-        self.carrier = Carrier(self.config.fields, self.config.width)
+        if count < 1:
+            raise TooFew("number of keypoints", count, 1)
+        self.config = config or DeformerNetConfig()
+        self.count = min(count, self.config.points)
+        self.encoder = Encoder(self.config.norm, density=self.config.density)
+        self.carrier = Carrier(FIELDS, WIDTH)
 
     def encode(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch, from `prepare`."""
@@ -164,31 +159,31 @@ class KeypointNet(nn.Module):
         try:
             here = self._seen(initial, "initial cloud")
             there = self._seen(goal, "goal cloud")
-            start, end = self.encode(stack([here.seen, there.seen]).to(self._device)).split(1)
+            start, end = self.encode(stack([here.seen, there.seen]).to(self._device))[:, None]
             points = here.seen.points[None, : self._fitted].to(self._device)
             moved = self.displacements(points, start, end)[0].cpu().numpy()
         finally:
             self.train(was_training)
         cloud = here.cloud[: self._fitted]
-        unit = np.float32(self.config.cloud.coordinate_unit)
+        unit = np.float32(self.config.coordinate_unit)
         carried = fit(cloud, cloud + moved * unit, there.cloud)
-        count = self.config.keypoints
+        count = self.count
         return Keypoints(cloud[:count], carried[:count], chamfer(carried, there.cloud))
 
     def _seen(self, cloud: Cloud, what: str) -> "_Seen":
-        points = self.config.cloud.points
+        points = self.config.points
         if len(cloud) < points:
             raise ShortCloud(len(cloud), points)
         bad = int((~np.isfinite(cloud).all(axis=1)).sum())
         if bad:
             raise BadCloud(what, bad, len(cloud))
         ordered = in_own_order(cloud, points, least=self._fitted)
-        return _Seen(ordered, prepare(ordered, self.config.cloud, what=what))
+        return _Seen(ordered, prepare(ordered, self.config, what=what))
 
     @property
     def _fitted(self) -> int:
         """Points that are carried: enough to know the surface by."""
-        return min(self.config.cloud.points, max(FITTED, self.config.keypoints))
+        return min(self.config.points, max(FITTED, self.count))
 
     @property
     def _device(self) -> torch.device:

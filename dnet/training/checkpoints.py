@@ -14,6 +14,7 @@ from torch import Tensor
 
 from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
+from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
@@ -118,7 +119,7 @@ def load_any(path: Path) -> Network:
 def begin_with(model: Network, path: Path) -> None:
     """Give `model` the weights that `path` holds, or what it needs of a DeformerNet's.
 
-    A regressor takes over its encoder, a dense predictor all of it, as its guide.
+    A dense predictor takes over all of it, as its guide; others its encoder.
 
     Args:
         model: An untrained network.
@@ -139,7 +140,7 @@ def begin_with(model: Network, path: Path) -> None:
             raise BadCheckpoint(path, why, "give the options that it was trained with")
     if isinstance(held, DeformerNet) and isinstance(model, DensePredictor):
         model.guide.load_state_dict(held.state_dict())
-    elif isinstance(held, DeformerNet) and isinstance(model, PointRegressor):
+    elif isinstance(held, DeformerNet) and isinstance(model, PointRegressor | KeypointNet):
         model.encoder.load_state_dict(held.encoder.state_dict())
     else:
         model.load_state_dict(held.state_dict())

@@ -18,7 +18,7 @@ class KeypointObjective:
 
     weights: KeypointLossWeights = field(default_factory=KeypointLossWeights)
     """How much each term of the loss counts."""
-    points: int = 384
+    points: int = 256
     """Points of each cloud that are carried and compared: its first ones, which lie evenly. The
     time of a step grows with the square."""
     neighbours: int = 8

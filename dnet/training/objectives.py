@@ -7,10 +7,12 @@ from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor, surface
 from dnet.nets.neighbourhoods import Neighbourhoods
+from dnet.training.keypoint_batch import KeypointObjective
 
-Network = DeformerNet | PointRegressor | DensePredictor
+Network = DeformerNet | PointRegressor | DensePredictor | KeypointNet
 """What can be trained."""
 
 LABEL_RADIUS = 0.005
@@ -28,7 +30,7 @@ class Objective(nn.Module, ABC):
     config: DeformerNetConfig
     """Of the network."""
     shown: float
-    """What a loss is multiplied with to be told: squared errors in mm²."""
+    """What a loss is multiplied with to be told: squared errors in mm², distances in mm."""
 
     @abstractmethod
     def forward(
@@ -139,6 +141,31 @@ class HeatMap(Objective):
         places = candidates[of] * self.config.coordinate_unit
         squares = (places - points[:, None]).square().sum(dim=2)
         return torch.log_softmax(-squares / (2 * LABEL_RADIUS**2), dim=1)
+
+
+class CarryingError(Objective):
+    """How badly a keypoint network carries clouds to one another; without labels."""
+
+    network: KeypointNet
+
+    def __init__(self, network: KeypointNet) -> None:
+        super().__init__()
+        self.network, self.config = network, network.config
+        self.shown = 1000 * network.config.coordinate_unit
+        self._loss = KeypointObjective()
+
+    def forward(
+        self,
+        clouds: Neighbourhoods,
+        current: Tensor,
+        goal: Tensor,
+        motions: Tensor,  # noqa: ARG002
+        points: Tensor,  # noqa: ARG002
+    ) -> Float[Tensor, " p"]:
+        """Return the loss of each pair, whose reverse must be in the batch, too."""
+        features = self.network.encode(clouds)
+        loss = self._loss.loss(self.network, clouds.points, features, current=current, goal=goal)
+        return loss.total
 
 
 def _squared(

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 from torch import Tensor
 
 from dnet.datasets.pairs import AnyTwo
 from dnet.errors import TooFew
 from dnet.nets.deformernet import DeformerNet
+from dnet.nets.keypoints import KeypointNet
 from dnet.training.frames import Frames, Rows
 
 # Encoded and compared at once: few enough that judging takes no more memory than learning.
@@ -104,7 +105,7 @@ def score(predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> Scores
 
 
 def errors_of(
-    model: DeformerNet,
+    model: DeformerNet | KeypointNet,
     frames: Frames,
     *,
     watch: Watch | None = None,
@@ -113,7 +114,8 @@ def errors_of(
     """Return the errors of `model` on all pairs of `frames`, None if there is no pair.
 
     One episode after another, each cloud with its usual centroids, so that the memory it takes
-    does not grow with the dataset.
+    does not grow with the dataset. Of a keypoint network, the motion is how far it carries the
+    manipulation point of the current frame: something that it was not taught.
 
     Args:
         model: On any device.
@@ -150,14 +152,14 @@ def no_motion(frames: Frames) -> Scores:
     return tally.scores()
 
 
-def _encode(model: DeformerNet, frames: Frames, rows: Rows) -> Float[Tensor, "n 256"]:
+def _encode(model: DeformerNet | KeypointNet, frames: Frames, rows: Rows) -> Float[Tensor, "n 256"]:
     device = next(model.parameters()).device
     batches = np.split(rows, range(_CLOUDS, len(rows), _CLOUDS))
     return torch.cat([model.encode(frames.prepared(batch).to(device)) for batch in batches])
 
 
 def _judge(
-    model: DeformerNet,
+    model: DeformerNet | KeypointNet,
     frames: Frames,
     rows: Rows,
     *,
@@ -171,10 +173,23 @@ def _judge(
     for start in range(0, len(pairs), _PAIRS):
         numbers = np.arange(start, min(start + _PAIRS, len(pairs)))
         current, goal = pairs.rows(numbers)
-        predicted = model.motion(features[current], features[goal]).float().cpu()
+        predicted = _motions(model, features[current], features[goal], frames.points(rows[current]))
         true = torch.from_numpy(frames.motions(rows[current], rows[goal]))
         every.add(predicted, true)
         begun = frames.table.rest[rows[current]]
         rest.add(predicted[begun], true[begun])
         if watch is not None:
             watch(rows[current], rows[goal], predicted, true)
+
+
+def _motions(
+    model: DeformerNet | KeypointNet,
+    start: Float[Tensor, "p 256"],
+    end: Float[Tensor, "p 256"],
+    grasps: Float32[np.ndarray, "p 3"],
+) -> Float[Tensor, "p 3"]:
+    if isinstance(model, DeformerNet):
+        return model.motion(start, end).float().cpu()
+    unit = model.config.coordinate_unit
+    points = torch.from_numpy(grasps / np.float32(unit)).to(start.device)[:, None]
+    return unit * model.displacements(points, start, end)[:, 0].float().cpu()

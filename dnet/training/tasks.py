@@ -7,15 +7,24 @@ from typing import Any, Literal, cast
 import torch
 
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.training.frames import Target
-from dnet.training.objectives import HeatMap, MotionError, Network, Objective, PointError
+from dnet.training.objectives import (
+    CarryingError,
+    HeatMap,
+    MotionError,
+    Network,
+    Objective,
+    PointError,
+)
 from dnet.training.point_scores import point_errors
 from dnet.training.scores import Errors, errors_of
 
-Model = Literal["deformernet", "grasp", "dense"]
+Model = Literal["deformernet", "grasp", "dense", "keypoints"]
 """`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
-`dense`: where to grasp, as a score for each point."""
+`dense`: where to grasp, as a score for each point; `keypoints`: which point is which, from clouds
+alone."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,17 @@ TASKS: dict[Model, Task] = {
         "Maps the initial and the goal cloud of a deformable object to a probability for each "
         "point of the initial cloud that it is the one to grasp (PointConv: Wu, Qi, Fuxin 2019).",
         "the middle",
+    ),
+    "keypoints": Task(
+        KeypointNet,
+        CarryingError,
+        "motion",
+        errors_of,
+        "Finds keypoints of a deformable object that are the same points of it in two clouds, "
+        "after the Transporter (Kulkarni et al. 2019) and KeypointDeformer (Jakab et al. 2021). "
+        "Its carrier learns from clouds alone. The errors are those of carrying the manipulation "
+        "point, of which it is told nothing; an encoder that was a DeformerNet's has seen motions.",
+        "no motion",
     ),
 }
 

@@ -5,9 +5,8 @@ import pytest
 
 from dnet.commands.evaluate import Evaluate
 from dnet.commands.evaluate_keypoints import EvaluateKeypoints
-from dnet.nets.deformernet import DeformerNetConfig
-from dnet.nets.keypoints import KeypointNet, KeypointNetConfig
-from dnet.training.keypoint_weights import save_keypoint_net
+from dnet.nets.keypoints import KeypointNet
+from dnet.training.checkpoints import save
 from tests.training.deforming_box import SMALL, BoxEpisode, write_boxes
 
 
@@ -15,10 +14,8 @@ def test_keypoints_are_judged_beside_what_learns_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = write_boxes(tmp_path / "data", [BoxEpisode(seed) for seed in range(4)])
-    cloud = DeformerNetConfig(points=SMALL.points)
-    config = KeypointNetConfig(cloud=cloud, keypoints=40, fields=8, width=16)
     path = tmp_path / "keypoints.safetensors"
-    save_keypoint_net(path, KeypointNet(config).state_dict(), config=config)
+    save(path, KeypointNet(SMALL))
     command = EvaluateKeypoints(data, path, cases=6, validation=0.5)
     tables = []
     for _ in range(2):

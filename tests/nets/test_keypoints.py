@@ -7,17 +7,18 @@ from hypothesis import strategies as st
 from dnet.errors import BadCloud, ShortCloud, TooFew
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNetConfig, prepare
-from dnet.nets.keypoints import KeypointNet, KeypointNetConfig, in_own_order
+from dnet.nets.keypoints import KeypointNet, in_own_order
 from dnet.nets.neighbourhoods import stack
 from dnet.types import Cloud
 
-CONFIG = KeypointNetConfig(cloud=DeformerNetConfig(points=192), keypoints=40, fields=8, width=16)
+CONFIG = DeformerNetConfig(points=192)
+COUNT = 40
 
 
 @pytest.fixture(scope="module")
 def net() -> KeypointNet:
     torch.manual_seed(0)
-    return KeypointNet(CONFIG).eval()
+    return KeypointNet(CONFIG, count=COUNT).eval()
 
 
 def box(seed: int, points: int = 192) -> Cloud:
@@ -49,7 +50,7 @@ def test_the_order_of_points_does_not_matter(net: KeypointNet, seed: int) -> Non
 def test_keypoints_are_points_of_the_initial_cloud_that_cover_it(net: KeypointNet) -> None:
     cloud = box(0)
     found = net.keypoints(cloud, box(1)).initial
-    assert len(found) == CONFIG.keypoints == len(np.unique(found, axis=0))
+    assert len(found) == COUNT == len(np.unique(found, axis=0))
     nearest = np.linalg.norm(cloud[:, None] - found, axis=2).min(axis=1)
     apart = np.linalg.norm(found[:, None] - found, axis=2) + np.eye(len(found))
     assert nearest.max() <= apart.min(), "each was the farthest from those before it"
@@ -66,7 +67,7 @@ def test_clouds_of_different_sizes_are_thinned(net: KeypointNet) -> None:
 
 def test_a_batch_is_as_one_by_one(net: KeypointNet) -> None:
     clouds = [farthest_points(box(seed), 192) for seed in range(4)]
-    seen = [prepare(cloud, CONFIG.cloud) for cloud in clouds]
+    seen = [prepare(cloud, CONFIG) for cloud in clouds]
     points = torch.stack([one.points for one in seen])
     with torch.no_grad():
         features = net.encode(stack(seen))
@@ -91,11 +92,10 @@ def test_a_short_or_broken_cloud_is_refused(net: KeypointNet) -> None:
         net.keypoints(box(0), broken)
 
 
-def test_more_keypoints_than_points_are_refused() -> None:
-    with pytest.raises(TooFew):
-        KeypointNetConfig(keypoints=0)
-    with pytest.raises(TooFew, match="150"):
-        KeypointNetConfig(cloud=DeformerNetConfig(points=150))
+def test_a_cloud_has_a_keypoint_at_least_and_no_more_than_it_has_points() -> None:
+    with pytest.raises(TooFew, match="number of keypoints is 0"):
+        KeypointNet(CONFIG, count=0)
+    assert KeypointNet(DeformerNetConfig(points=150)).count == 150
 
 
 def test_an_order_of_its_own_begins_far_from_the_middle() -> None:

@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
+from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor, surface
 from dnet.training.examples import Examples, stream_of
 from dnet.training.frames import Frames
-from dnet.training.objectives import HeatMap, MotionError, Objective, PointError
+from dnet.training.objectives import CarryingError, HeatMap, MotionError, Objective, PointError
 from dnet.training.parallel import Process
 from dnet.training.settings import TrainingSettings
 from dnet.training.tasks import TASKS, Model, new_network, task_of
@@ -112,3 +115,22 @@ def test_a_regressors_loss_is_its_squared_error(frames: Frames) -> None:
     points = network(examples.clouds.take(rests), examples.clouds.take(examples.goal), of)
     squares = (1000 * (points - examples.points)).square().mean(dim=1)
     torch.testing.assert_close(losses(objective, examples) * objective.shown, squares)
+
+
+def test_carrying_is_learned_from_clouds_alone(frames: Frames) -> None:
+    network = TASKS["keypoints"].new(frames.config, seed=0)
+    assert isinstance(network, KeypointNet)
+    examples, objective = batch(frames, "keypoints"), CarryingError(network)
+    told_nothing = replace(examples, motions=0 * examples.motions, points=0 * examples.points)
+    torch.testing.assert_close(losses(objective, examples), losses(objective, told_nothing))
+    stream = stream_of(frames, SETTINGS, process=Process())
+    training = Training(objective, stream, SETTINGS)
+    before, told = TASKS["keypoints"].judge(network, frames), []
+    assert before is not None
+    while training.progress < 1:
+        told += [step.loss for step in training.epoch()]
+        training.close_epoch()
+    after = TASKS["keypoints"].judge(training.average, frames)
+    assert after is not None
+    assert np.mean(told[-8:]) < 0.7 * np.mean(told[:8])
+    assert after.main.mse_mm2 < 0.7 * before.main.zero_mse_mm2
