@@ -27,6 +27,10 @@ from dnet.nets.neighbourhoods import Neighbourhoods, stack
 from dnet.nets.pointconv import gather, make_norm
 from dnet.types import Cloud, Point
 
+SCORED = 512
+"""Points of a cloud that a choice is made from, besides its hidden sides: 4 mm apart on an object
+of 0.1 m."""
+
 
 class Chosen(NamedTuple):
     """What a network makes of two clouds."""
@@ -34,8 +38,8 @@ class Chosen(NamedTuple):
     point: Point
     """Where to grasp, in metres."""
     candidates: Float32[np.ndarray, "c 3"] | None = None
-    """Points of the surface that were scored: the initial cloud, and the sides that are hidden
-    from the camera; None of a regressor."""
+    """Points of the surface that were scored: the first ones of the initial cloud, the farthest
+    from each other, and the sides that are hidden from the camera; None of a regressor."""
     probabilities: Float32[np.ndarray, " c"] | None = None
     """Of each candidate."""
 
@@ -190,10 +194,10 @@ class DensePredictor(nn.Module):
             BadCloud: If a coordinate is NaN or infinite.
         """
         here, there = _prepared(initial, goal, self.config)
-        candidates = surface(here)
+        candidates = surface(here, SCORED)
         scores = self(here, there, torch.zeros(1, dtype=torch.int64), candidates=candidates).scores
-        places = torch.from_numpy(np.concatenate([initial, hidden_sides(initial)]))
-        point = most_likely(scores, places)[0].numpy().astype(np.float64)
+        places = torch.from_numpy(np.concatenate([initial[:SCORED], hidden_sides(initial)]))
+        point = expected(scores, places)[0].numpy().astype(np.float64)
         return Chosen(point, places.numpy(), scores[0].exp().numpy())
 
 
@@ -204,19 +208,18 @@ def surface(clouds: Neighbourhoods, count: int | None = None) -> Float[Tensor, "
     return torch.cat([seen, torch.stack(sides).to(seen)], dim=1)
 
 
-def most_likely(
-    scores: Float[Tensor, "p n"], points: Float[Tensor, "n 3"], *, radius: float = 0.01
+def expected(
+    scores: Float[Tensor, "p c"], candidates: Float[Tensor, "c 3"]
 ) -> Float[Tensor, "p 3"]:
-    """Return the point with the most probability around it, for each goal of one initial cloud.
+    """Return the candidate nearest to the mean of the heat map, for each goal of one cloud.
 
     Args:
         scores: Logarithms of probabilities.
-        points: The candidates, in metres.
-        radius: Of what counts as around it, in metres (a Gaussian's standard deviation).
+        candidates: In metres.
     """
-    distances = torch.cdist(points, points, compute_mode="donot_use_mm_for_euclid_dist")
-    around = scores.exp() @ torch.exp(-0.5 * (distances / radius).square())
-    return points[around.argmax(dim=1)]
+    means = scores.exp() @ candidates
+    nearest = torch.cdist(means, candidates, compute_mode="donot_use_mm_for_euclid_dist")
+    return candidates[nearest.argmin(dim=1)]
 
 
 def propagate(

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from dnet.errors import NoDisplacement
 from dnet.geometry.chamfer import chamfer, nearest_distances
@@ -49,14 +50,17 @@ class NetworkPicker:
         """
         refuse_no_displacement(initial, goal)
         chosen = self.network.choose(initial, goal)
-        surface = np.concatenate([initial, hidden_sides(initial)])
-        distances = np.linalg.norm(surface - chosen.point, axis=1)
-        point = _point(surface, int(distances.argmin()))
         if chosen.candidates is None or chosen.probabilities is None:
+            surface = np.concatenate([initial, hidden_sides(initial)])
+            distances = np.linalg.norm(surface - chosen.point, axis=1)
+            point = _point(surface, int(distances.argmin()))
             return Choice(point, float(np.exp(-distances.min() / NEAR)))
-        scores = chosen.probabilities.astype(np.float64)
-        about = np.linalg.norm(chosen.candidates - point, axis=1) < 2 * NEAR
-        return Choice(point, min(1.0, float(scores[about].sum())), scores[: len(initial)])
+        probabilities = chosen.probabilities.astype(np.float64)
+        about = np.linalg.norm(chosen.candidates - chosen.point, axis=1) < 2 * NEAR
+        confidence = min(1.0, float(probabilities[about].sum()))
+        # A point that was not scored is as good as the nearest that was.
+        _, nearest = cKDTree(chosen.candidates).query(initial)
+        return Choice(chosen.point, confidence, probabilities[nearest])
 
 
 @dataclass(frozen=True)

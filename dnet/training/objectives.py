@@ -18,9 +18,9 @@ Network = DeformerNet | PointRegressor | DensePredictor | KeypointNet
 LABEL_RADIUS = 0.005
 """Standard deviation of the Gaussian about the manipulation point that scores are compared with,
 in metres: about the distance between the points of a cloud that are scored."""
-SCORED = 256
-"""Points of a cloud that are scored in training, its first ones, the farthest from each other;
-besides its hidden sides."""
+LEARNED = 256
+"""Points of a cloud that are scored in training, besides its hidden sides: half of those that a
+choice is made from, for the sake of speed."""
 
 
 class Objective(nn.Module, ABC):
@@ -126,7 +126,7 @@ class HeatMap(Objective):
         """Return the divergence of each pair's scores, and the error of its motion."""
         rests, of = torch.unique(current, return_inverse=True)
         initial = clouds.take(rests)
-        candidates = surface(initial, SCORED)
+        candidates = surface(initial, LEARNED)
         found = self.network(initial, clouds.take(goal), of, candidates=candidates)
         labels = self._labels(candidates, of, points)
         divergence = (labels.exp() * (labels - found.scores.float())).sum(dim=1)

@@ -8,10 +8,11 @@ from jaxtyping import Float
 from torch import Tensor
 
 from dnet.nets.manipulation_point import (
+    SCORED,
     DensePredictor,
     PointRegressor,
+    expected,
     middle,
-    most_likely,
     surface,
 )
 from dnet.nets.neighbourhoods import Neighbourhoods
@@ -90,6 +91,6 @@ def _points(
     if isinstance(model, PointRegressor):
         answer: Tensor = model(initial, goal, of)
         return answer
-    candidates = surface(initial)
+    candidates = surface(initial, SCORED)
     scores = model(initial, goal, of, candidates=candidates).scores
-    return most_likely(scores.float(), candidates[0] * model.config.coordinate_unit)
+    return expected(scores.float(), candidates[0] * model.config.coordinate_unit)

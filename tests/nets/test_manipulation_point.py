@@ -8,8 +8,8 @@ from dnet.nets.deformernet import DeformerNetConfig, prepare
 from dnet.nets.manipulation_point import (
     DensePredictor,
     PointRegressor,
+    expected,
     middle,
-    most_likely,
     propagate,
     surface,
 )
@@ -86,10 +86,10 @@ def test_a_regressor_without_a_head_chooses_the_middle() -> None:
     )
 
 
-def test_a_crowd_of_likely_points_beats_a_lonely_one() -> None:
-    points = torch.tensor([[0.0, 0, 0], [0.001, 0, 0], [0.002, 0, 0], [0.1, 0, 0]])
-    scores = torch.tensor([[0.2, 0.25, 0.2, 0.35], [0.1, 0.1, 0.1, 0.7]]).log()
-    torch.testing.assert_close(most_likely(scores, points), points[[1, 3]])
+def test_the_candidate_nearest_to_the_mean_of_the_heat_map_is_expected() -> None:
+    candidates = torch.tensor([[0.0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [0.1, 0, 0]])
+    scores = torch.tensor([[0.4, 0.0, 0.6, 0.0], [0.0, 0.0, 0.1, 0.9]]).log()
+    torch.testing.assert_close(expected(scores, candidates), candidates[[1, 3]])
 
 
 def test_values_are_propagated_exactly_to_the_places_and_evenly_between() -> None:
