@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from dnet.evaluation.grasp import Answers, Case
     from dnet.recorders.grasp_recording import GraspCase
+    from dnet.servo.displacement_heuristic import DisplacementHeuristic
     from dnet.servo.pickers import Picker
 
 
@@ -35,6 +36,8 @@ class Grasp:
     """Directory for the table, the cases and the picture."""
     cases: int = 100
     """How many, over all unseen episodes evenly."""
+    keypoints: Path | None = None
+    """Run of `dnet train --model keypoints`; the network that ships, unless given."""
     regressor: Path | None = None
     """Run of `dnet train --model grasp`; the network that ships, unless given."""
     dense: Path | None = None
@@ -94,9 +97,18 @@ class Grasp:
         return {
             "random point": RandomPoint(self.seed),
             "most displaced point": MostDisplaced(),
+            "keypoints": self._heuristic(),
             "regressor": NetworkPicker(load_kind(self.regressor or REGRESSOR, PointRegressor)),
             "dense": NetworkPicker(load_kind(self.dense or DENSE, DensePredictor)),
         }
+
+    def _heuristic(self) -> "DisplacementHeuristic":
+        from dnet.nets.keypoints import KeypointNet
+        from dnet.servo.displacement_heuristic import DisplacementHeuristic
+        from dnet.training.checkpoints import load_kind
+        from dnet.weights import KEYPOINTS
+
+        return DisplacementHeuristic(load_kind(self.keypoints or KEYPOINTS, KeypointNet).keypoints)
 
     def _write(
         self, out: Path, cases: "Sequence[Case]", answers: "dict[str, Answers]", table: str
@@ -111,13 +123,27 @@ class Grasp:
             part.write_text(text, encoding="utf-8")
             part.replace(out / name)
         draw_cases(cases, answers, out / "grasp.png")
-        views = [self._view(number, case, answers) for number, case in enumerate(cases)]
+        heuristic = self._heuristic()
+        views = [self._view(number, case, answers, heuristic) for number, case in enumerate(cases)]
         write_grasps(out / "grasp.rrd", views)
 
-    def _view(self, number: int, case: "Case", answers: "dict[str, Answers]") -> "GraspCase":
-        from dnet.recorders.grasp_recording import GraspCase
+    def _view(
+        self,
+        number: int,
+        case: "Case",
+        answers: "dict[str, Answers]",
+        heuristic: "DisplacementHeuristic",
+    ) -> "GraspCase":
+        from dnet.errors import NoDisplacement
+        from dnet.recorders.grasp_recording import GraspCase, KeypointPairs
 
         choice = answers["dense"].choices[number]
+        try:
+            found = heuristic.choose(case.initial, case.goal)
+        except NoDisplacement:
+            pairs = None
+        else:
+            pairs = KeypointPairs(found.keypoints.initial, found.keypoints.goal, found.weights)
         return GraspCase(
             case.name,
             case.initial,
@@ -125,4 +151,5 @@ class Grasp:
             {name: found.points[number] for name, found in answers.items()},
             case.truth,
             None if choice is None else choice.scores,
+            pairs,
         )

@@ -27,7 +27,8 @@ class EvaluateKeypoints:
     from_mcap: Annotated[str | Path, tyro.conf.arg(metavar="DIRECTORY|URL")]
     """Episodes."""
     checkpoint: Path | None = None
-    """A keypoint network; without one, only the methods that learn nothing are judged."""
+    """Run of `dnet train --model keypoints`, or one of its files; the network that ships, unless
+    given."""
     cases: int = 100
     """Pairs of a rest shape and a goal."""
     most: int = 20
@@ -60,6 +61,7 @@ class EvaluateKeypoints:
         from dnet.nets.keypoints import KeypointNet
         from dnet.servo.displacement_heuristic import FindKeypoints
         from dnet.training.checkpoints import load_kind
+        from dnet.weights import KEYPOINTS
 
         if self.cases < 1:
             raise TooFew("--cases", self.cases, 1)
@@ -68,8 +70,7 @@ class EvaluateKeypoints:
         methods: dict[str, FindKeypoints] = {"unmoved": unmoved, "rigid registration": rigid}
         if self.drift:
             methods["coherent point drift"] = coherent
-        if self.checkpoint is not None:
-            methods["learned"] = load_kind(self.checkpoint, KeypointNet).keypoints
+        methods["learned"] = load_kind(self.checkpoint or KEYPOINTS, KeypointNet).keypoints
         console = Console(stderr=True)
         places = self._held_out(read_index(as_place(self.from_mcap), console))
         cases = list(read_cases(places, self.cases, random=np.random.default_rng(self.seed)))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 Controller = Literal["deformernet", "oracle", "none", "rrt"]
-Grasp = Literal["truth", "regressor", "dense", "displaced", "farthest"]
+Grasp = Literal["truth", "keypoints", "regressor", "dense", "displaced", "farthest"]
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,10 @@ class ServoOptions:
     """Directory that `dnet train` wrote, one of its .safetensors files, or an .onnx of `dnet
     export`; the network that ships, unless given."""
     grasp: Grasp = "truth"
-    """What decides where the object is grasped: the point at which the goal was made; a network
-    that answers with a position, or with a score for each point; the point farthest from the
-    goal; or the one farthest from the truth, as bad as can be."""
+    """What decides where the object is grasped: the point at which the goal was made; keypoints,
+    where those are that move most; a network that answers with a position (`regressor`), or with
+    a score for each point (`dense`); the point farthest from the goal (`displaced`), or from the
+    truth, as bad as can be."""
     grasp_checkpoint: Path | None = None
     """Network that chooses the grasp; the one that ships, unless given."""
     steps: int = 12

@@ -11,16 +11,18 @@ import dnet
 from dnet.errors import BadCheckpoint, UnknownTruth
 from dnet.laboratory import Laboratory
 from dnet.nets.deformernet import DeformerNet
+from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.onnx_network import OnnxDeformerNet
 from dnet.servo.controllers import Controller, Nothing, Oracle
+from dnet.servo.displacement_heuristic import DisplacementHeuristic
 from dnet.servo.grasp_pickers import FarthestPoint, MostDisplaced, NetworkPicker
 from dnet.servo.pickers import Picker, TruePoint
 from dnet.servo.random_trials import RandomTree
 from dnet.training.checkpoints import load_kind
 from dnet.trials.goals import Task
 from dnet.trials.request import Trial
-from dnet.weights import DEFORMERNET, DENSE, REGRESSOR
+from dnet.weights import DEFORMERNET, DENSE, KEYPOINTS, REGRESSOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,11 @@ def _dense(setting: Setting) -> Picker:
     return NetworkPicker(load_kind(setting.trial.grasp_checkpoint or DENSE, DensePredictor))
 
 
+def _keypoints(setting: Setting) -> Picker:
+    network = load_kind(setting.trial.grasp_checkpoint or KEYPOINTS, KeypointNet)
+    return DisplacementHeuristic(network.keypoints, workspace=setting.lab.settings.workspace)
+
+
 def _displaced(setting: Setting) -> Picker:
     del setting
     return MostDisplaced()
@@ -101,6 +108,7 @@ def _farthest(setting: Setting) -> Picker:
 
 PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
     "truth": _truth,
+    "keypoints": _keypoints,
     "regressor": _regressor,
     "dense": _dense,
     "displaced": _displaced,

@@ -8,3 +8,5 @@ REGRESSOR = DEFORMERNET.with_name("grasp.safetensors")
 """Where to grasp, as a position."""
 DENSE = DEFORMERNET.with_name("dense.safetensors")
 """Where to grasp, as a score for each point."""
+KEYPOINTS = DEFORMERNET.with_name("keypoints.safetensors")
+"""Which point of an object is which in another cloud of it."""

@@ -62,6 +62,8 @@ def test_a_network_is_judged_on_all_pairs_of_any_dataset(
 def test_methods_of_grasping_are_trained_and_compared_with_the_truth(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    Train(data, tmp_path / "keypoints", model="keypoints", epochs=2, device="cpu").run()
+    capsys.readouterr()
     for model in ("grasp", "dense"):
         Train(data, tmp_path / model, model=model, epochs=2, device="cpu", validation=0.3).run()
         card = (tmp_path / model / "MODEL_CARD.md").read_text()
@@ -77,14 +79,15 @@ def test_methods_of_grasping_are_trained_and_compared_with_the_truth(
         out,
         cases=6,
         validation=1.0,
+        keypoints=tmp_path / "keypoints",
         regressor=tmp_path / "grasp",
         dense=tmp_path / "dense",
     )
     Evaluate(report).run()
     table = (out / "grasp.md").read_text()
-    methods = ("random point", "most displaced point", "regressor", "dense")
+    methods = ("random point", "most displaced point", "keypoints", "regressor", "dense")
     assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == [f"| {m}" for m in methods]
-    assert len((out / "grasp.csv").read_text().splitlines()) == 1 + 6 * 4
+    assert len((out / "grasp.csv").read_text().splitlines()) == 1 + 6 * 5
     assert {path.name for path in out.iterdir()} == {
         "grasp.md",
         "grasp.csv",
