@@ -13,8 +13,9 @@ ControllerName = Literal["deformernet", "oracle", "none", "rrt"]
 tries at random."""
 GraspName = Literal["truth", "keypoints", "regressor", "dense", "displaced", "farthest"]
 """`truth`: the point at which the goal was made; `keypoints`: where those are that move most;
-`regressor`, `dense`: networks that answer with a position, or with a score for each point; `displaced`: the point farthest from the goal cloud;
-`farthest`: the one farthest from the truth, as bad as can be."""
+`regressor`, `dense`: networks that answer with a position, or with a score for each point;
+`displaced`: the point farthest from the goal cloud; `farthest`: the one farthest from the truth,
+as bad as can be."""
 
 RANDOM = "random"
 RUN = "run.mcap"
