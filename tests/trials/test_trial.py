@@ -138,7 +138,7 @@ def test_a_grasp_that_is_lost(lab: Laboratory, tmp_path: Path) -> None:
 def test_an_object_that_is_out_of_view(lab: Laboratory, tmp_path: Path) -> None:
     # Of the camera's images this seed loses three in a row after the second turn.
     asked = trial(tmp_path, dropped=0.5, settings=ServoSettings(patience=0, steps=50), seed=8)
-    trace = run_trial(asked, lab, say=silent, controller=Towards(UP / 4))
+    trace = run_trial(asked, lab, say=silent, controller=Towards(UP))
     check_whole(tmp_path, trace, lab, "object_lost")
     assert "3 images in a row" in trace.reason
     assert len(trace.steps) == 2
