@@ -101,7 +101,8 @@ class _End(Exception):
 
     def __init__(self, outcome: Outcome, reason: str, last: Frame | None = None) -> None:
         super().__init__(outcome)
-        self.outcome, self.reason, self.last = outcome, reason, last
+        self.outcome: Outcome = outcome
+        self.reason, self.last = reason, last
 
 
 class _Run:
@@ -123,7 +124,7 @@ class _Run:
 
     def trace(self) -> Trace:
         """Run to the end."""
-        last = None
+        last: Frame | None = None
         try:
             outcome, reason = self._go()
         except _End as end:
