@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float64, Int64
 
 from dnet.errors import DiskAlmostFull
 from dnet.laboratory import Laboratory
@@ -21,11 +22,15 @@ from dnet.sim.urdf import psm_urdf
 from dnet.trials.request import LATENCY, RECORDING, RUN
 from dnet.types import ARMS, EpisodeMeta, Goal, JointPath, Joints, Step, Trace
 
-PICTURES = 20
+PICTURES = 10
 """Of the moving arm in a Rerun recording, a second of simulation."""
+TIPS = 50
+"""Positions of its tip on a planned path, likewise: 4 mm apart."""
 RESERVE = 32_000_000
 """Bytes that must be free before each step: enough to write it, and to end all files whole."""
 
+Times = Float64[np.ndarray, "_"]
+Rows = Int64[np.ndarray, "_"]
 Say = Callable[[str], None]
 Free = Callable[[Path], int]
 
@@ -126,7 +131,8 @@ class TrialLog:
             return
         tips = None
         if step.plan is not None:
-            tips = np.array([self._arms.tip(joints) for joints in step.plan.path])
+            shown = step.plan.path[_rows(step.plan.times, TIPS)]
+            tips = np.array([self._arms.tip(joints) for joints in shown])
         self._recording.log_step(index, step, tips)
         if step.plan is not None:
             times = step.frame.time + step.plan.times
@@ -154,12 +160,11 @@ class TrialLog:
             {"outcome": trace.outcome, "reason": trace.reason, "chamfer": chamfers, **result}
         )
 
-    def _along(self, times: np.ndarray, holding: Joints, path: JointPath) -> None:
+    def _along(self, times: Times, holding: Joints, path: JointPath) -> None:
         if self._recording is None:
             return
         # The links of each position take a millisecond: as many as the eye needs will do.
-        count = min(len(path), int(np.ceil((times[-1] - times[0]) * PICTURES)) + 1)
-        rows = np.unique(np.linspace(0, len(path) - 1, max(count, 1)).round().astype(int))
+        rows = _rows(times, PICTURES)
         still = np.tile(holding, (len(rows), 1))
         self._recording.arms_along(times[rows], (still, path[rows]))
 
@@ -167,6 +172,12 @@ class TrialLog:
         free = self._free(self._out)
         if free < RESERVE:
             raise DiskAlmostFull(self._out, free, RESERVE)
+
+
+def _rows(times: Times, rate: float) -> Rows:
+    """Return rows of a timed path, so many a second, both ends among them."""
+    count = min(len(times), int(np.ceil((times[-1] - times[0]) * rate)) + 1)
+    return np.unique(np.linspace(0, len(times) - 1, count).round().astype(np.int64))
 
 
 def pose_of(joints: tuple[Joints, Joints]) -> dict[str, list[float]]:
