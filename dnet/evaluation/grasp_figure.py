@@ -48,10 +48,10 @@ def draw_cases(cases: Sequence[Case], answers: Mapping[str, Answers], path: Path
 
 
 def _draw(axes: Axes3D, cloud: Cloud, colour: str, title: str) -> None:
-    axes.scatter(*cloud.T, s=1.5, c=colour, depthshade=True, linewidths=0)
+    axes.scatter(*cloud.T, s=2, c=colour, depthshade=True, linewidths=0)
     axes.set_title(title, fontsize=8, y=0.95)
     axes.set(xlim=(-0.08, 0.12), ylim=(-0.1, 0.1), zlim=(0, 0.12))
-    axes.set_box_aspect((1, 1, 0.6), zoom=1.6)
+    axes.set_box_aspect((1, 1, 0.6), zoom=2)
     axes.view_init(elev=40, azim=-70)
     axes.set_axis_off()
 

@@ -103,6 +103,9 @@ class Carrier(nn.Module):
 class KeypointNet(nn.Module):
     """An encoder for clouds, and a carrier that moves points as the object deforms.
 
+    The encoder is that of a trained DeformerNet, and stays as it is: one that learns along from
+    clouds alone forgets what tells motions along the surface, which hardly change a cloud.
+
     Args:
         config: How the network sees a cloud: its encoder is that of DeformerNet.
         count: Keypoints of an object; at most as many as a cloud has points.
@@ -114,9 +117,16 @@ class KeypointNet(nn.Module):
             raise TooFew("number of keypoints", count, 1)
         self.config = config or DeformerNetConfig()
         self.count = min(count, self.config.points)
-        self.encoder = Encoder(self.config.norm, density=self.config.density)
+        self.encoder = Encoder(self.config.norm, density=self.config.density).requires_grad_(False)
         self.carrier = Carrier(FIELDS, WIDTH)
 
+    def train(self, mode: bool = True) -> "KeypointNet":
+        """Train, or not; the encoder never does."""
+        super().train(mode)
+        self.encoder.eval()
+        return self
+
+    @torch.no_grad()
     def encode(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
         """Return the features of each cloud of a batch, from `prepare`."""
         features: Tensor = self.encoder(clouds)

@@ -1,6 +1,7 @@
 """What each network is trained to do: from a batch to the loss of each of its pairs."""
 
 from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
 
 import torch
 from jaxtyping import Float, Int64
@@ -14,6 +15,7 @@ from dnet.training.keypoint_batch import KeypointObjective
 
 Network = DeformerNet | PointRegressor | DensePredictor | KeypointNet
 """What can be trained."""
+N = TypeVar("N", bound=Network)
 
 LABEL_RADIUS = 0.005
 """Standard deviation of the Gaussian about the manipulation point that scores are compared with,
@@ -23,10 +25,10 @@ LEARNED = 256
 choice is made from, for the sake of speed."""
 
 
-class Objective(nn.Module, ABC):
+class Objective(nn.Module, ABC, Generic[N]):
     """A network and its loss, as one call: what several processes average the gradient of."""
 
-    network: Network
+    network: N
     config: DeformerNetConfig
     """Of the network."""
     shown: float
@@ -52,10 +54,8 @@ class Objective(nn.Module, ABC):
         """
 
 
-class MotionError(Objective):
+class MotionError(Objective[DeformerNet]):
     """Squared error of DeformerNet's motions, mean over x, y, z, in its unit."""
-
-    network: DeformerNet
 
     def __init__(self, network: DeformerNet) -> None:
         super().__init__()
@@ -76,10 +76,8 @@ class MotionError(Objective):
         return _squared(found, motions, unit=self.config.motion_unit)
 
 
-class PointError(Objective):
+class PointError(Objective[PointRegressor]):
     """Squared error of a regressor's points, mean over x, y, z, in its unit."""
-
-    network: PointRegressor
 
     def __init__(self, network: PointRegressor) -> None:
         super().__init__()
@@ -100,14 +98,12 @@ class PointError(Objective):
         return _squared(found, points, unit=self.config.motion_unit)
 
 
-class HeatMap(Objective):
+class HeatMap(Objective[DensePredictor]):
     """How far a dense predictor's scores are from a Gaussian about the manipulation point.
 
     The Kullback-Leibler divergence of the one from the other, in nats, and the squared error of
     the motions that guide it, in its unit.
     """
-
-    network: DensePredictor
 
     shown = 1.0
 
@@ -143,10 +139,8 @@ class HeatMap(Objective):
         return torch.log_softmax(-squares / (2 * LABEL_RADIUS**2), dim=1)
 
 
-class CarryingError(Objective):
+class CarryingError(Objective[KeypointNet]):
     """How badly a keypoint network carries clouds to one another; without labels."""
-
-    network: KeypointNet
 
     def __init__(self, network: KeypointNet) -> None:
         super().__init__()

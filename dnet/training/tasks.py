@@ -32,7 +32,7 @@ class Task:
     """A network and how it is trained and judged."""
 
     network: type[Network]
-    objective: Callable[[Any], Objective]
+    objective: Callable[[Any], Objective[Any]]
     target: Target
     judge: Callable[..., Errors | None]
     """`errors_of`, or what takes its place."""

@@ -40,7 +40,7 @@ class Training:
 
     def __init__(
         self,
-        objective: Objective,
+        objective: Objective[Any],
         stream: Stream[Examples],
         settings: TrainingSettings,
         *,

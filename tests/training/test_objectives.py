@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def batch(frames: Frames, model: Model) -> Examples:
     return next(iter(stream_of(frames, SETTINGS, process=Process(), target=task.target)))
 
 
-def losses(objective: Objective, batch: Examples) -> torch.Tensor:
+def losses(objective: Objective[Any], batch: Examples) -> torch.Tensor:
     return objective(batch.clouds, batch.current, batch.goal, batch.motions, batch.points)
 
 
