@@ -99,9 +99,9 @@ def open_session(graph: bytes) -> Any:
         MissingExtra: If onnxruntime is not installed.
     """
     try:
-        from onnxruntime import InferenceSession, SessionOptions  # noqa: PLC0415
+        import onnxruntime  # noqa: PLC0415
     except ImportError as error:
         raise MissingExtra("onnxruntime", "onnx", "an ONNX network") from error
-    options = SessionOptions()
+    options = onnxruntime.SessionOptions()  # pyright: ignore[reportAttributeAccessIssue]
     options.intra_op_num_threads = torch.get_num_threads()
-    return InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])

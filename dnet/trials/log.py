@@ -174,7 +174,7 @@ class TrialLog:
             raise DiskAlmostFull(self._out, free, RESERVE)
 
 
-def _rows(times: Times, rate: float) -> Rows:
+def _rows(times: Times, rate: int | float) -> Rows:
     """Return rows of a timed path, so many a second, both ends among them."""
     count = min(len(times), int(np.ceil((times[-1] - times[0]) * rate)) + 1)
     return np.unique(np.linspace(0, len(times) - 1, count).round().astype(np.int64))
