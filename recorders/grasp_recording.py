@@ -145,7 +145,7 @@ def _layout(*, keypoints: bool) -> rrb.Blueprint:
         rrb.Vertical(
             rrb.Horizontal(*views),
             rrb.TextDocumentView(name="Case", origin="/about"),
-            row_shares=[4, 1.2],
+            row_shares=[2.4, 1],
         ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

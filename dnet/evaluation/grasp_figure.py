@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from dnet.evaluation.grasp import Answers, Case
 from dnet.types import Cloud, Point
 
-_OBJECT, _GOAL, _TRUTH, _CHOICE = "#c9a18f", "#8fb6c9", "#1d8a3a", "#1f4fd1"
+_OBJECT, _GOAL, _TRUTH, _CHOICE = "#b5715a", "#5590b0", "#1d8a3a", "#1f4fd1"
 
 
 def draw_cases(cases: Sequence[Case], answers: Mapping[str, Answers], path: Path) -> None:
@@ -51,7 +51,8 @@ def _draw(axes: Axes3D, cloud: Cloud, colour: str, title: str) -> None:
     axes.scatter(*cloud.T, s=2, c=colour, depthshade=True, linewidths=0)
     axes.set_title(title, fontsize=8, y=0.95)
     axes.set(xlim=(-0.08, 0.12), ylim=(-0.1, 0.1), zlim=(0, 0.12))
-    axes.set_box_aspect((1, 1, 0.6), zoom=2)
+    # The stubs of matplotlib 3.10 have whole numbers only.
+    axes.set_box_aspect((1, 1, 0.6), zoom=1.35)  # pyright: ignore[reportArgumentType]
     axes.view_init(elev=40, azim=-70)
     axes.set_axis_off()
 
