@@ -13,7 +13,7 @@ from dnet.nets.manipulation_point import Chosen
 from dnet.servo.pickers import Choice
 from dnet.types import Cloud, Point
 
-FLOOR = 0.002
+FLOOR = 0.0013
 """Chamfer distance below which two clouds are of one shape, in metres: two samplings of a shape
 are about 1 mm apart."""
 NEAR = 0.01
