@@ -43,7 +43,7 @@ SCENE: Box = (0.0, 0.1, 0.6, 0.95)
 UPPER_LEFT: Box = (0.0, 0.1, 0.3, 0.4)
 UPPER_RIGHT: Box = (0.3, 0.1, 0.6, 0.4)
 NOTICES: Box = (0.78, 0.0, 1.0, 0.03)
-BLUE = (40, 80, 150), (120, 180, 255)
+FAR = (130, 0, 0), (230, 80, 60)
 GREEN = (20, 110, 40), (90, 220, 120)
 STEEL = (110, 110, 110), (240, 240, 240)
 
@@ -60,8 +60,9 @@ def test_a_picture_shows_the_object_the_goal_and_both_arms(tmp_path: Path) -> No
         writer.finish({})
     picture = tmp_path / "new" / "a.png"
     play([tmp_path / "a.mcap"], open_episode=EpisodeReader, screenshot=picture)
-    assert share(picture, *BLUE, SCENE) > 0.005
-    assert share(picture, *GREEN, SCENE) > 0.005
+    # What is far from the goal is red.
+    assert share(picture, *FAR, SCENE) > 0.003
+    assert share(picture, *GREEN, SCENE) > 0.003
     assert share(picture, *STEEL, UPPER_LEFT) > 0.01
     assert share(picture, *STEEL, UPPER_RIGHT) > 0.01
     assert share(picture, *STEEL, NOTICES) < 0.01
