@@ -129,8 +129,8 @@ def test_a_missing_file_and_an_empty_directory_are_refused(tmp_path: Path) -> No
 
 def test_another_network_is_refused(tmp_path: Path, model: DeformerNet) -> None:
     file = tmp_path / "other.safetensors"
-    save_file(model.state_dict(), file, metadata=header(network="KeypointNet"))
-    with pytest.raises(BadCheckpoint, match="holds KeypointNet, not one of DeformerNet, "):
+    save_file(model.state_dict(), file, metadata=header(network="NextNet"))
+    with pytest.raises(BadCheckpoint, match="holds NextNet, not one of DeformerNet, "):
         load(file)
     save_file(model.state_dict(), file)
     with pytest.raises(BadCheckpoint, match="holds an unnamed network, not one of"):

@@ -16,7 +16,7 @@ from dnet.training.tasks import TASKS, Model, new_network, task_of
 from dnet.training.training import Training
 from tests.training.deforming_box import SMALL, box_frames
 
-SETTINGS = TrainingSettings(groups=2, frames=3, augmentation=None, epochs=30)
+SETTINGS = TrainingSettings(groups=2, frames=3, augmentation=None, epochs=18)
 
 
 @pytest.fixture(scope="module")
