@@ -72,5 +72,7 @@ def test_a_random_point_is_of_the_cloud_and_a_function_of_the_seed() -> None:
 @pytest.mark.parametrize("picker", [MostDisplaced(), NetworkPicker(Said(np.zeros(3)))])
 def test_the_initial_shape_as_a_goal_is_refused(picker: Picker) -> None:
     jittered = (FLAT + np.random.default_rng(0).normal(0, 5e-4, FLAT.shape)).astype(np.float32)
-    with pytest.raises(NoDisplacement, match=r"0\.\d mm from the initial shape, need at least 1\.3"):
+    with pytest.raises(
+        NoDisplacement, match=r"0\.\d mm from the initial shape, need at least 1\.3"
+    ):
         picker.pick(FLAT, jittered)
