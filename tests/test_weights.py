@@ -74,9 +74,9 @@ def test_grasps_are_chosen_nearer_to_the_truth_than_without_learning(tmp_path: P
         for line in (tmp_path / "out" / "grasp.md").read_text().splitlines()[2:]
     ]
     means = {row[0]: float(row[2]) for row in rows}
-    for method in ("keypoints", "regressor", "dense"):
+    for method, share in (("keypoints", 0.7), ("regressor", 0.6), ("dense", 0.6)):
         assert means[method] < means["most displaced point"]
-        assert means[method] < 0.7 * means["random point"]
+        assert means[method] < share * means["random point"]
 
 
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:
