@@ -175,13 +175,15 @@ Outcome = Literal[
     "planning_failed",
     "grasp_lost",
     "object_lost",
+    "object_crushed",
     "bad_motion",
     "disk_full",
     "interrupted",
 ]
 """How a run ends. `converged`: the predicted motion is small; `reached`: the goal is near;
 `stalled`: it gets no nearer; `grasp_lost`, `object_lost`: the jaws hold nothing, the camera sees
-too little; `bad_motion`: the prediction is no number."""
+too little; `object_crushed`: the mesh is inside out, as no tissue can be; `bad_motion`: the
+prediction is no number."""
 
 
 @dataclass(frozen=True, slots=True)

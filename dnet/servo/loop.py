@@ -16,6 +16,7 @@ from dnet.errors import NoSpace, ShortCloud
 from dnet.geometry.chamfer_to import ChamferTo
 from dnet.servo.controllers import Controller
 from dnet.servo.verdict import ServoSettings, verdict
+from dnet.sim.world import Settling
 from dnet.types import Frame, Goal, JointPath, Joints, Latency, Outcome, Plan, Point, Step, Trace
 
 
@@ -26,8 +27,9 @@ class Scene(Protocol):
     def follow(self, path: JointPath, times: Float64[np.ndarray, "_"]) -> None:
         """Drive the moving arm along a timed joint path."""
 
-    def settle(self) -> object:
-        """Let the object come to rest."""
+    def settle(self) -> Settling:
+        """Let the object come to rest, and say what became of it."""
+        ...
 
     def slip(self) -> float:
         """Return how far what the moving arm grasped is from between its jaws, in metres."""
@@ -212,8 +214,11 @@ class _Run:
         clock = perf_counter()
         self._motions += 1
         self._around.scene.follow(plan.path, plan.times)
-        self._around.scene.settle()
+        settling = self._around.scene.settle()
         self._finish(_timed(step, execute=_since(clock)))
+        if not settling.least_volume_ratio > 0:
+            ratio = f"a tetrahedron has {settling.least_volume_ratio:.2g} of its volume at rest"
+            raise _End("object_crushed", f"step {len(self._steps) - 1}: {ratio}")
 
     def _finish(self, step: Step) -> None:
         self._steps[-1] = step

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dnet.sim.world import Settling
 from dnet.types import Cloud, Frame, JointPath, Joints, Plan, Point, Step
 
 SHAPE = np.random.default_rng(0).uniform(-0.05, 0.05, (256, 3)).astype(np.float32)
@@ -32,8 +33,9 @@ class Slab:
         self.tip = path[-1, :3].copy()
         self.time += float(times[-1])
 
-    def settle(self) -> None:
+    def settle(self) -> Settling:
         self.time += 0.1
+        return Settling(settled=True, steps=1, least_volume_ratio=1.0)
 
     def slip(self) -> float:
         return self.slipped

@@ -11,6 +11,7 @@ import pytest
 from dnet.errors import ShortCloud
 from dnet.servo.loop import Surroundings, servo
 from dnet.servo.verdict import ServoSettings
+from dnet.sim.world import Settling
 from dnet.types import Frame, Goal, Joints, Outcome, Plan, Point, Step, Trace
 from tests.servo.slab import SHAPE, TARGET, Notes, Share, Slab, without_time
 
@@ -203,9 +204,9 @@ def test_a_motion_that_is_no_number_ends_the_run_and_what_was_seen_is_kept() -> 
 
 def test_a_grasp_that_slips_is_lost() -> None:
     class Slippery(Slab):
-        def settle(self) -> None:
-            super().settle()
+        def settle(self) -> Settling:
             self.slipped += 0.006
+            return super().settle()
 
     trace, _ = run(Slippery(), 0.3)
     assert trace.outcome == "grasp_lost"
@@ -214,12 +215,24 @@ def test_a_grasp_that_slips_is_lost() -> None:
     assert trace.last is not None
 
 
+def test_an_object_that_is_turned_inside_out_ends_the_run() -> None:
+    class Soft(Slab):
+        def settle(self) -> Settling:
+            return replace(super().settle(), least_volume_ratio=1.0 - 2 * self.time)
+
+    trace, notes = run(Soft(), 0.3)
+    assert trace.outcome == "object_crushed"
+    assert trace.reason == "step 0: a tetrahedron has -0.2 of its volume at rest"
+    assert len(trace.steps) == len(notes.timings) == 1
+
+
 def test_an_interrupted_run_keeps_the_steps_it_took() -> None:
     class Impatient(Slab):
-        def settle(self) -> None:
-            super().settle()
+        def settle(self) -> Settling:
+            settling = super().settle()
             if self.time > 1.0:
                 raise KeyboardInterrupt
+            return settling
 
     trace, notes = run(Impatient(), 0.3)
     assert trace.outcome == "interrupted"

@@ -135,6 +135,14 @@ def test_a_grasp_that_is_lost(lab: Laboratory, tmp_path: Path) -> None:
     assert trace.reason == "the jaws are open"
 
 
+def test_an_object_that_is_crushed(lab: Laboratory, tmp_path: Path) -> None:
+    """Drawn to the table on the far side of the arm that holds it."""
+    harsh = Towards(np.array([-0.15, 0.0, -0.02]))
+    trace = run_trial(trial(tmp_path), lab, say=silent, controller=harsh)
+    check_whole(tmp_path, trace, lab, "object_crushed")
+    assert "of its volume at rest" in trace.reason
+
+
 def test_an_object_that_is_out_of_view(lab: Laboratory, tmp_path: Path) -> None:
     # Of the camera's images this seed loses three in a row after the second turn.
     asked = trial(tmp_path, dropped=0.5, settings=ServoSettings(patience=0, steps=50), seed=8)
