@@ -119,6 +119,11 @@ class TrialLog:
         if self._recording is not None:
             self._recording.log_text(text, time=time)
 
+    def warn(self, text: str, *, time: float) -> None:
+        """Write a line and show it to people now."""
+        self.note(text, time=time)
+        self._say(f"warning: {text}")
+
     def add(self, index: int, step: Step) -> None:
         """Write one step, and the way of the arm until the next.
 

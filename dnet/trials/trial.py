@@ -15,6 +15,7 @@ from dnet.errors import DnetError, NoGrasp, OtherRun, ShortCloud
 from dnet.laboratory import Laboratory
 from dnet.servo.controllers import Controller
 from dnet.servo.grasping import Hand
+from dnet.servo.held_end import LIMIT, held_end_apart
 from dnet.servo.loop import Surroundings, servo
 from dnet.servo.pickers import Picker, candidates
 from dnet.sim.grasp import at
@@ -65,6 +66,8 @@ def run_trial(
         ) as log:
             log.start(task.goal, grasping.hand.motions)
             grasping.tell = log
+            if grasping.apart > LIMIT:
+                log.warn(_another_object(grasping.apart), time=lab.world.time)
             trace = servo(
                 Surroundings(
                     lab.world,
@@ -98,6 +101,8 @@ class _Grasping:
         self.hand = Hand(lab.world, lab.planner, along, trial.seed)
         self.points: list[Point] = []
         """Every point of the object at rest at which it was grasped, in order."""
+        self.apart = 0.0
+        """How far the goal is from the object where the other arm holds it, in metres."""
 
     def begin(self) -> Point:
         """Set the object down, look at it, and grasp it where the picker says.
@@ -126,6 +131,7 @@ class _Grasping:
     def _grasp(self) -> str:
         self.hand.let_go()
         initial = self._initial()
+        self.apart = held_end_apart(initial, self._task.goal.cloud, self._task.scene.hold)
         choice = self._picker.pick(initial, self._task.goal.cloud)
         point, why = self.hand.grasp(list(candidates(choice, initial, self.points)))
         if point is None:
@@ -139,6 +145,14 @@ class _Grasping:
             with suppress(ShortCloud):
                 return self._eyes.look("way").cloud
         return self._eyes.look("way").cloud
+
+
+def _another_object(apart: float) -> str:
+    off = f"{apart * 1e3:.1f} mm off the object where the other arm holds it"
+    return (
+        f"the goal is {off} (limit {LIMIT * 1e3:.0f} mm):"
+        " is it the goal of another object, or of this one in another place?"
+    )
 
 
 def _meta(trial: Trial, task: Task, lab: Laboratory, point: Point) -> EpisodeMeta:
@@ -169,6 +183,7 @@ def _result(trace: Trace, grasping: _Grasping, lab: Laboratory) -> dict[str, Any
     return {
         "motions": sum(step.plan is not None for step in trace.steps),
         "grasped": [point.tolist() for point in grasping.points],
+        "held_end_apart": grasping.apart,
         "holding": bool(np.isfinite(lab.world.slip())),
         "arms": pose_of(lab.world.joints),
     }

@@ -14,6 +14,7 @@ from dnet.errors import DiskAlmostFull, OtherRun, ShortCloud, UnknownTruth
 from dnet.geometry.chamfer import chamfer
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
 from dnet.servo.verdict import ServoSettings
+from dnet.trials.goals import read_task
 from dnet.trials.log import RESERVE
 from dnet.trials.request import Trial
 from dnet.trials.trial import clear, is_finished, run_trial
@@ -141,6 +142,27 @@ def test_an_object_that_is_crushed(lab: Laboratory, tmp_path: Path) -> None:
     trace = run_trial(trial(tmp_path), lab, say=silent, controller=harsh)
     check_whole(tmp_path, trace, lab, "object_crushed")
     assert "of its volume at rest" in trace.reason
+
+
+def test_a_goal_of_another_object_is_told(lab: Laboratory, tmp_path: Path) -> None:
+    """Of the same box, cut to half its length: the end that is held is missing."""
+    box = read_task(trial(tmp_path), lab).goal.cloud
+    half = box[np.argsort(box[:, 0])[-len(box) // 2 :]]
+    other = np.concatenate([half, half + np.float32(1e-4)])
+    for name, cloud, warnings in (("own", box, 0), ("other", other, 1)):
+        np.save(tmp_path / f"{name}.npy", cloud)
+        lines: list[str] = []
+        asked = trial(
+            tmp_path / name,
+            goal=str(tmp_path / f"{name}.npy"),
+            controller="none",
+            grasp="displaced",
+        )
+        run_trial(replace(asked, seed=3), lab, say=lines.append)
+        told = [line for line in lines if "where the other arm holds it (limit 6 mm)" in line]
+        assert len(told) == warnings
+        with EpisodeReader(tmp_path / name / "run.mcap") as run:
+            assert ((run.result or {})["held_end_apart"] > 0.006) == bool(warnings)
 
 
 def test_an_object_that_is_out_of_view(lab: Laboratory, tmp_path: Path) -> None:
