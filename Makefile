@@ -62,7 +62,7 @@ demo: setup ## Record, train, servo and play on a small scale; results in demo/
 
 test: develop ## Run the checks and the tests
 	$(MAKE) --no-print-directory check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
 
 check: lint type layers ## Run the static checks
 
