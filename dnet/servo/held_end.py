@@ -10,8 +10,9 @@ REACH = 0.012
 SHARE = 0.9
 """Of the points there, how many must be near the goal; the others may bend away."""
 LIMIT = 0.006
-"""Above this the goal is hardly of this object, in metres. Of 80 goals of the box itself none was above
-4.8 mm; of 160 of a cylinder or a hemi-ellipsoid 156 were, and of 80 of a box lying elsewhere 24."""
+"""Above this the goal is hardly of this object, in metres. Of 80 goals of the box itself none was
+above 4.8 mm; of 160 of a cylinder or a hemi-ellipsoid 156 were above 6 mm, and of 80 of a box
+lying elsewhere 24."""
 
 
 def held_end_apart(initial: Cloud, goal: Cloud, hold: tuple[float, float, float]) -> float:
