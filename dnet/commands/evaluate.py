@@ -111,7 +111,9 @@ class Ablations:
 class Network:
     """Judge a trained network, whatever its kind, on all pairs of a dataset's settled frames.
 
-    The dataset may be any: other objects, another world, other people's clouds.
+    The dataset may be any: other objects, another world, other people's clouds. With --validation
+    it is parted as `dnet train` parts one, by hashes of episodes and shapes, and each part is
+    judged by itself: the same seeds recorded in another world are parted alike.
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
@@ -121,6 +123,11 @@ class Network:
     checkpoint: Path | None = None
     """Directory of `dnet train`, or one of its .safetensors files; the DeformerNet that ships,
     unless given."""
+    validation: float | None = None
+    """Share that the training held out; what it learned from, unseen shapes and unseen episodes
+    are then judged apart. (The networks that ship: 0.1.)"""
+    seed: int = 0
+    """Of that division."""
     json: tyro.conf.FlagCreatePairsOff[bool] = False
     """Print JSON instead of a table."""
 
@@ -131,6 +138,7 @@ class Network:
             DnetError: If the network or the episodes will not do.
         """
         from dataclasses import asdict
+        from functools import partial
         from json import dumps
 
         from rich.console import Console
@@ -141,6 +149,7 @@ class Network:
         from dnet.datasets.frame_table import settled_frames
         from dnet.datasets.stores import as_place
         from dnet.training.checkpoints import load_any
+        from dnet.training.division import divide
         from dnet.training.frames import Frames
         from dnet.training.tasks import task_of
         from dnet.weights import DEFORMERNET
@@ -148,18 +157,25 @@ class Network:
         console = Console(stderr=True)
         model = load_any(self.checkpoint or DEFORMERNET)
         judged_by = task_of(model)
-        table = settled_frames(read_index(as_place(self.from_mcap), console))
-        name = str(self.from_mcap).rstrip("/").rsplit("/", 1)[-1]
-        frames = Frames.of(table, model.config)
-        with progress(console, "clouds") as bar:
-            task = bar.add_task("finding neighbours", total=len(table))
-            frames.tables.build(on_clouds=lambda done: bar.advance(task, done))
-            task = bar.add_task("judging", total=len(table))
-            errors = judged_by.judge(model, frames, on_clouds=lambda done: bar.advance(task, done))
-        if self.json:
-            print(dumps(None if errors is None else asdict(errors), indent=2))
+        index = read_index(as_place(self.from_mcap), console)
+        if self.validation is None:
+            name = str(self.from_mcap).rstrip("/").rsplit("/", 1)[-1]
+            parts = {name: settled_frames(index)}
         else:
-            Console().print(error_table({name: errors}, title="errors", zero=judged_by.zero))
+            parts = divide(index, fraction=self.validation, seed=self.seed).parts
+        errors = {}
+        with progress(console, "clouds") as bar:
+            for name, table in parts.items():
+                frames = Frames.of(table, model.config)
+                task = bar.add_task(f"finding neighbours, {name}", total=len(table))
+                frames.tables.build(on_clouds=partial(bar.advance, task))
+                task = bar.add_task(f"judging, {name}", total=len(table))
+                errors[name] = judged_by.judge(model, frames, on_clouds=partial(bar.advance, task))
+        if self.json:
+            told = {name: found and asdict(found) for name, found in errors.items()}
+            print(dumps(told[name] if self.validation is None else told, indent=2))
+        else:
+            Console().print(error_table(errors, title="errors", zero=judged_by.zero))
 
 
 @dataclass(frozen=True)

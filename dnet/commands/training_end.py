@@ -47,11 +47,7 @@ def finish(
         return
     network = load_any(run.path).to(next(training.model.parameters()).device)
     task = task_of(network)
-    parts = {
-        "training": thinned(division.training, JUDGED),
-        "unseen shapes": division.unseen_shapes,
-        "unseen episodes": division.unseen_episodes,
-    }
+    parts = division.parts | {"training": thinned(division.training, JUDGED)}
     errors: dict[str, Errors | None] = {}
     with progress(console, "clouds") as bar:
         bar_task = bar.add_task("judging", total=sum(len(table) for table in parts.values()))

@@ -25,6 +25,15 @@ class Division:
     skipped: int
     """Files with fewer than two settled frames, hence without a pair."""
 
+    @property
+    def parts(self) -> dict[str, FrameTable]:
+        """The three parts, by the names that people read."""
+        return {
+            "training": self.training,
+            "unseen shapes": self.unseen_shapes,
+            "unseen episodes": self.unseen_episodes,
+        }
+
 
 def divide(index: Index, *, fraction: float, seed: int) -> Division:
     """Return which frames of a dataset to learn from.

@@ -59,6 +59,19 @@ def test_a_network_is_judged_on_all_pairs_of_any_dataset(
     assert f"{errors['any_pair']['mse_mm2']:.2f}" in capsys.readouterr().out
 
 
+def test_a_network_is_judged_apart_on_what_its_training_held_out(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Train(data, tmp_path / "run", epochs=1, device="cpu", validation=0.3).run()
+    trained = json.loads((tmp_path / "run" / "errors.json").read_text())
+    capsys.readouterr()
+    Evaluate(Network(data, tmp_path / "run", validation=0.3, json=True)).run()
+    judged = json.loads(capsys.readouterr().out)
+    assert list(judged) == ["training", "unseen shapes", "unseen episodes"]
+    for name, errors in judged.items():
+        assert errors["any_pair"] == pytest.approx(trained[name]["any_pair"])
+
+
 def test_methods_of_grasping_are_trained_and_compared_with_the_truth(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
