@@ -189,6 +189,16 @@ class NoScreen(DnetError, RuntimeError):
         )
 
 
+class NoLiveView(DnetError, RuntimeError):
+    """A window that was to show a run live, and that there is not."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(
+            f"no live view: {why}; the run goes on, `dnet play` and the directory of the run "
+            "show it afterwards"
+        )
+
+
 class NoPicture(DnetError, RuntimeError):
     """A viewer that did not draw."""
 

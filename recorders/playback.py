@@ -11,7 +11,8 @@ from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording, U
 from dnet.recorders.blueprint import Company
 from dnet.recorders.replay import OpenEpisode, application, replay, replay_beside
 from dnet.recorders.salvage import whole_recording
-from dnet.recorders.viewer import RERUN, draw, show
+from dnet.recorders.viewer import draw, show
+from dnet.recorders.viewer_process import RERUN
 from dnet.types import Place
 
 Progress = Callable[[int, int], None]

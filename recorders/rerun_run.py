@@ -1,5 +1,6 @@
 """A servo run as a Rerun recording, written while it happens."""
 
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -12,6 +13,7 @@ from dnet.recorders.arms import ArmModel
 from dnet.recorders.blueprint import SERVO_APPLICATION, servo_blueprint
 from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.rerun_scene import CHAMFER, RerunScene, transforms_along
+from dnet.recorders.run_sinks import OpenView, RunSinks
 from dnet.recorders.step_text import describe_step
 from dnet.types import Cloud, Frame, Goal, JointPath, Step
 
@@ -27,12 +29,23 @@ class RerunRun:
         name: What the viewer calls it.
         arms: Both arms.
         urdf: The URDF of one arm, drawn twice.
+        view: Opens a window that shows the run while it goes on; None for none.
+        say: Shows a line to people, if there is trouble with the window.
 
     Raises:
         OccupiedOutput: If `path` is already there.
     """
 
-    def __init__(self, path: Path, *, name: str, arms: ArmModel, urdf: str) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        name: str,
+        arms: ArmModel,
+        urdf: str,
+        view: OpenView | None = None,
+        say: Callable[[str], None] = print,
+    ) -> None:
         if path.exists():
             raise OccupiedOutput(path, "a Rerun recording")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -42,7 +55,9 @@ class RerunRun:
         self._now = 0.0
         self._step: int | None = None
         self._recording = rr.RecordingStream(SERVO_APPLICATION)
-        self._recording.save(self.part, default_blueprint=servo_blueprint())
+        self._sinks = RunSinks(
+            self._recording, self.part, blueprint=servo_blueprint(), view=view, say=say
+        )
         self._recording.send_recording_name(name)
         self._scene = RerunScene(self._recording, urdf=urdf, counter="step")
         self._scene.name_joints(arms.joint_names)
@@ -67,7 +82,7 @@ class RerunRun:
     def log_goal(self, cloud: Cloud) -> None:
         """Log the shape to reach, for all times."""
         self._scene.log_goal(cloud)
-        self._recording.flush()
+        self._sinks.flush()
 
     def log_target(self, goal: Goal) -> None:
         """Log the shape to reach, and what is known of it, for all times."""
@@ -80,7 +95,7 @@ class RerunRun:
             return
         self._scene.set_time(step.frame.time, count=index)
         self._scene.log_latency(step.latency)
-        self._recording.flush()
+        self._sinks.flush()
 
     def log_step(self, index: int, step: Step, tip_path: Float64[np.ndarray, "_ 3"] | None) -> None:
         """Log one turn of the servo loop and flush it.
@@ -107,13 +122,13 @@ class RerunRun:
             scene.set_time(frame.time, count=index)
         troubled = plan is not None and plan.status in ("partial", "failed")
         scene.log_text(describe_step(step, index), level="WARN" if troubled else "INFO")
-        self._recording.flush()
+        self._sinks.flush()
 
     def log_frame(self, frame: Frame) -> None:
         """Log a frame that was seen on the way from one step to the next."""
         self._scene.set_time(frame.time)
         self._scene.log_frame(frame, self._arms.transforms(frame.joints))
-        self._recording.flush()
+        self._sinks.flush()
 
     def arms_along(
         self, times: Float64[np.ndarray, "_"], joints: tuple[JointPath, JointPath]
@@ -126,7 +141,7 @@ class RerunRun:
         """
         self._scene.log_transforms_along(times, transforms_along(self._arms, joints))
         self._scene.log_joints_along(times, joints)
-        self._recording.flush()
+        self._sinks.flush()
 
     def log_text(self, message: str, *, time: float | None = None) -> None:
         """Log a line for people, at `time` or at that of the last step."""
@@ -135,7 +150,7 @@ class RerunRun:
         else:
             self._scene.set_time(time)
         self._scene.log_text(message)
-        self._recording.flush()
+        self._sinks.flush()
 
     def close(self) -> None:
         """Write what is left and give the recording its name; a second call does nothing.
@@ -152,5 +167,4 @@ class RerunRun:
 
     def _disconnect(self) -> None:
         self._closed = True
-        self._recording.flush()
-        self._recording.disconnect()
+        self._sinks.close()

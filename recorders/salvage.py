@@ -7,7 +7,7 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from dnet.errors import BadEpisode
-from dnet.recorders.viewer import RERUN
+from dnet.recorders.viewer_process import RERUN
 
 SALVAGE_SECONDS = 300.0
 

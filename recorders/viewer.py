@@ -1,30 +1,24 @@
-"""The Rerun viewer as a child process: in a window, or without a screen, drawing one picture."""
+"""The Rerun viewer at the end of a command: in a window, or without a screen for one picture."""
 
-import os
-import signal
-import socket
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 from rerun.experimental import ViewerClient, ViewerState
 
-from dnet.errors import NoPicture, NoScreen, ViewerFailed
+from dnet.errors import NoPicture, ViewerFailed
 from dnet.recorders.rerun_scene import TIME_TIMELINE
-
-RERUN = (
-    sys.executable,
-    "-c",
-    # `python -m rerun_cli` would lose the status.
-    "import sys; from rerun_cli.__main__ import main; sys.exit(main())",
+from dnet.recorders.viewer_process import (
+    LOCAL,
+    QUIET,
+    Viewer,
+    check_screen,
+    command,
+    free_port,
+    running,
 )
-"""The command line of Rerun that belongs to this Python, wherever the PATH leads."""
-LOCAL = "127.0.0.1"
-"""The viewer listens on every interface unless told otherwise."""
+
 WINDOW = "1600x900"
 TRIES = 3
 START_SECONDS = 20.0
@@ -41,11 +35,8 @@ def show(files: Sequence[Path]) -> None:
         NoScreen: If there is no screen to open it on.
         ViewerFailed: If the viewer ends by an error.
     """
-    screens = ("DISPLAY", "WAYLAND_DISPLAY")
-    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in screens):
-        raise NoScreen
-    command = _command("--port", "auto", *map(str, files))
-    with running(command, output=None, environment=_environment()) as viewer:
+    check_screen()
+    with running(command("--port", "auto", *map(str, files)), None, QUIET) as viewer:
         status = viewer.wait()
     if status:
         raise ViewerFailed(status)
@@ -71,13 +62,13 @@ def draw(file: Path, picture: Path, *, seconds: float | None) -> None:
 
 
 def _draw_once(file: Path, seconds: float | None) -> bytes:
-    port = _free_port()
-    command = _command("--headless", "--port", str(port), "--hide-welcome-screen")
-    command += ["--window-size", WINDOW, str(file)]
+    port = free_port()
+    headless = command("--headless", "--port", str(port), "--hide-welcome-screen")
+    headless += ["--window-size", WINDOW, str(file)]
     with tempfile.TemporaryDirectory() as directory:
         log = Path(directory) / "viewer.log"
-        environment = {"XDG_RUNTIME_DIR": directory, **_environment()}
-        with log.open("wb") as output, running(command, output.fileno(), environment) as viewer:
+        environment = {"XDG_RUNTIME_DIR": directory, **QUIET}
+        with log.open("wb") as output, running(headless, output.fileno(), environment) as viewer:
             started = time.monotonic()
             try:
                 client, state = _loaded(f"rerun+http://{LOCAL}:{port}/proxy", viewer)
@@ -91,7 +82,7 @@ def _draw_once(file: Path, seconds: float | None) -> bytes:
                 raise
 
 
-def _loaded(url: str, viewer: "subprocess.Popen[bytes]") -> tuple[ViewerClient, ViewerState]:
+def _loaded(url: str, viewer: Viewer) -> tuple[ViewerClient, ViewerState]:
     """Wait until the viewer shows the whole recording."""
     deadline = time.monotonic() + START_SECONDS
     error: Exception | None = None
@@ -138,54 +129,3 @@ def _settled_picture(client: ViewerClient, started: float) -> bytes:
             return picture
         before = picture
         time.sleep(POLL_SECONDS)
-
-
-@contextmanager
-def running(
-    command: Sequence[str], output: int | None, environment: Mapping[str, str]
-) -> Iterator["subprocess.Popen[bytes]"]:
-    """Run the viewer in a process group of its own, and end all of the group.
-
-    The command is a Python launcher: ending it alone would leave the viewer behind.
-    """
-    process = subprocess.Popen(
-        command,
-        env={**os.environ, **environment},
-        stdin=subprocess.DEVNULL,
-        stdout=output,
-        stderr=output,
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        _end(process)
-
-
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    for sign in (signal.SIGTERM, signal.SIGKILL):
-        try:
-            os.killpg(process.pid, sign)
-        except ProcessLookupError:
-            break
-        try:
-            process.wait(timeout=2)
-        except subprocess.TimeoutExpired:
-            continue
-    process.wait()
-
-
-def _command(*arguments: str) -> list[str]:
-    return [*RERUN, "--bind", LOCAL, *arguments]
-
-
-def _environment() -> dict[str, str]:
-    # The viewer is part of a command: it is not to ask about statistics in its output.
-    return {"RERUN_APP_ONLY": "true"}
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((LOCAL, 0))
-        port: int = probe.getsockname()[1]
-    return port

@@ -128,8 +128,8 @@ class Servo:
     The goal is a frame of a recorded episode, a cloud of your own, or drawn at random. The arm
     grasps the object, and each step plans a collision-free motion (straight line first,
     RRT-Connect around what blocks it). Everything is written to OUT/run.mcap, OUT/run.rrd and
-    OUT/latency.jsonl; `dnet play OUT` shows the run. However it ends, its outcome has a name, and
-    the arms stay where they are and hold what they hold.
+    OUT/latency.jsonl; `dnet play OUT` shows the run, --view shows it live. However it ends, its
+    outcome has a name, and the arms stay where they are and hold what they hold.
 
     Example: dnet servo --goal data/episode-0-00003.mcap:7 --out servo
 
@@ -152,6 +152,9 @@ class Servo:
     """Processes for the runs of `--goals`."""
     scene: Annotated[Path | None, tyro.conf.arg(metavar="EPISODE")] = None
     """For a cloud: set the object down as in this episode; unless given, as the seed draws it."""
+    view: bool = False
+    """Show the run in a window while it goes on; it is written to OUT all the same. Closing the
+    window does not stop the run."""
     options: tyro.conf.OmitArgPrefixes[ServoOptions] = field(default_factory=ServoOptions)
 
     def run(self) -> None:
@@ -161,10 +164,12 @@ class Servo:
             DnetError: If the checkpoint, the goal or the output directory will not do, or the
                 grasp is out of reach.
         """
-        from dnet.errors import OneOf
+        from dnet.errors import OneOf, UnusedOption
 
         if (self.goal is None) == (self.goals is None):
             raise OneOf("--goal", "--goals")
+        if self.view and self.goal is None:
+            raise UnusedOption("--view", "--goal")
         if self.goals is None:
             self._run_one(str(self.goal))
         else:
@@ -179,6 +184,7 @@ class Servo:
 
         from dnet.commands.stopping import stopping
         from dnet.laboratory import laboratory
+        from dnet.recorders.live_view import LiveView
         from dnet.trials.trial import run_trial
 
         self._check()
@@ -188,7 +194,8 @@ class Servo:
         say = partial(Console().print, highlight=False, markup=False, soft_wrap=True)
         asked = threading.Event()
         with laboratory(trial.laboratory) as lab, stopping(asked.set):
-            trace = run_trial(trial, lab, say=say, stop=asked.is_set)
+            view = LiveView if self.view else None
+            trace = run_trial(trial, lab, say=say, stop=asked.is_set, view=view)
         say(summary(trace))
         say(f"watch it with `dnet play {self.out}`")
         if trace.outcome == "interrupted":

@@ -16,6 +16,7 @@ from dnet.errors import DiskAlmostFull
 from dnet.laboratory import Laboratory
 from dnet.recorders.episode import EpisodeWriter
 from dnet.recorders.rerun_run import RerunRun
+from dnet.recorders.run_sinks import OpenView
 from dnet.recorders.step_text import describe_latency, describe_step
 from dnet.servo.grasping import Motion
 from dnet.sim.urdf import psm_urdf
@@ -51,6 +52,7 @@ class TrialLog:
         *,
         say: Say,
         recording: bool = True,
+        view: OpenView | None = None,
         free: Free = free_bytes,
     ) -> None:
         """Start the files of a run.
@@ -61,6 +63,7 @@ class TrialLog:
             lab: Where it happens.
             say: Shows a line to people.
             recording: Whether to write a Rerun recording.
+            view: Opens a window that shows the recording while it is written; None for none.
             free: Says how much room a folder has.
 
         Raises:
@@ -83,7 +86,14 @@ class TrialLog:
         self._recording = None
         if recording:
             self._recording = self._files.enter_context(
-                RerunRun(out / RECORDING, name=meta.episode_id, arms=lab.arms, urdf=psm_urdf())
+                RerunRun(
+                    out / RECORDING,
+                    name=meta.episode_id,
+                    arms=lab.arms,
+                    urdf=psm_urdf(),
+                    view=view,
+                    say=say,
+                )
             )
         self._latencies = self._files.enter_context((out / LATENCY).open("w", encoding="utf-8"))
 

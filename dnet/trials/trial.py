@@ -13,6 +13,7 @@ import dnet
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import DnetError, NoGrasp, OtherRun, ShortCloud
 from dnet.laboratory import Laboratory
+from dnet.recorders.run_sinks import OpenView
 from dnet.servo.controllers import Controller
 from dnet.servo.grasping import Hand
 from dnet.servo.held_end import LIMIT, held_end_apart
@@ -34,6 +35,7 @@ def run_trial(
     say: Say,
     stop: Callable[[], bool] = bool,
     controller: Controller | None = None,
+    view: OpenView | None = None,
     free: Free = free_bytes,
 ) -> Trace:
     """Carry a trial out and return what happened; its files tell the same.
@@ -44,6 +46,7 @@ def run_trial(
         say: Shows a line to people.
         stop: Whether somebody wants the run to end.
         controller: Decides instead of the one that the trial names.
+        view: Opens a window that shows the run while it goes on; None for none.
         free: Says how much room a folder has.
 
     Raises:
@@ -62,6 +65,7 @@ def run_trial(
             lab,
             say=say,
             recording=trial.recording,
+            view=view,
             free=free,
         ) as log:
             log.start(task.goal, grasping.hand.motions)

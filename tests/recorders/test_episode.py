@@ -19,7 +19,7 @@ from dnet.geometry.camera import Camera
 from dnet.geometry.pose import look_at
 from dnet.recorders.arms import orientation_in_world
 from dnet.recorders.episode import EpisodeWriter
-from dnet.recorders.viewer import RERUN
+from dnet.recorders.viewer_process import RERUN
 from dnet.types import Transform
 from tests.recorders.rollout import (
     ARMS,

@@ -6,7 +6,8 @@ import pytest
 from PIL import Image
 
 from dnet.recorders.grasp_recording import GraspCase, KeypointPairs, write_grasps
-from dnet.recorders.viewer import RERUN, draw
+from dnet.recorders.viewer import draw
+from dnet.recorders.viewer_process import RERUN
 from tests.recorders.rollout import frames
 from tests.recorders.rrd import entities, rows
 

@@ -9,7 +9,7 @@ from rerun.error_utils import RerunWarning
 
 from dnet.errors import OccupiedOutput
 from dnet.recorders.rerun_run import RerunRun
-from dnet.recorders.viewer import RERUN
+from dnet.recorders.viewer_process import RERUN
 from dnet.sim.urdf import psm_urdf
 from dnet.types import Goal, Latency
 from tests.recorders.rollout import ARMS, GRASP, frames, step

@@ -17,7 +17,8 @@ from dnet.recorders.training_values import (
     SetErrors,
     WorstSample,
 )
-from dnet.recorders.viewer import RERUN, draw
+from dnet.recorders.viewer import draw
+from dnet.recorders.viewer_process import RERUN
 from tests.recorders.rollout import frames
 from tests.recorders.rrd import entities, rows
 

@@ -1,4 +1,3 @@
-import os
 import sys
 import time
 from pathlib import Path
@@ -6,14 +5,9 @@ from pathlib import Path
 import pytest
 
 from dnet.errors import NoPicture, NoScreen, ViewerFailed
-from dnet.recorders.viewer import draw, running, show
-
-
-def stand_in(path: Path, script: str) -> Path:
-    """Write a program to run in the viewer's place, which its launcher allows."""
-    path.write_text(f"#!/bin/sh\n{script}\n")
-    path.chmod(0o755)
-    return path
+from dnet.recorders.viewer import draw, show
+from dnet.recorders.viewer_process import running
+from tests.recorders.viewers import ends, stand_in
 
 
 @pytest.fixture
@@ -72,17 +66,4 @@ def test_no_child_of_the_viewer_outlives_it(tmp_path: Path, stubborn: str) -> No
         while not number.exists() and time.monotonic() < deadline:
             time.sleep(0.01)
     child = int(number.read_text())
-    deadline = time.monotonic() + 10
-    while alive(child) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert not alive(child)
-
-
-def alive(process: int) -> bool:
-    """Return whether a process runs; one that ended and waits to be collected does not."""
-    try:
-        os.kill(process, 0)
-        state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except (ProcessLookupError, FileNotFoundError):
-        return False
-    return state != "Z"
+    assert ends(child)

@@ -7,18 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rerun_cli
 from rerun.chunk import RrdReader
 
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import DiskAlmostFull, OtherRun, ShortCloud, UnknownTruth
 from dnet.geometry.chamfer import chamfer
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
+from dnet.recorders.live_view import LiveView
+from dnet.recorders.run_sinks import LOST
 from dnet.servo.verdict import ServoSettings
 from dnet.trials.goals import read_task
 from dnet.trials.log import RESERVE
 from dnet.trials.request import Trial
 from dnet.trials.trial import clear, is_finished, run_trial
 from dnet.types import ARMS, Cloud, Outcome, Point, Trace
+from tests.recorders.rrd import rows
+from tests.recorders.viewers import ends, stand_in
 
 LAB = LaboratorySettings(points=512, world="quasistatic")
 ROOM = 10 * RESERVE
@@ -257,3 +262,42 @@ def test_a_cloud_of_ones_own_is_a_goal(lab: Laboratory, tmp_path: Path) -> None:
         assert run.meta.settings["goal"] == "goal.npy"
     with pytest.raises(UnknownTruth, match="--controller oracle needs to know"):
         run_trial(replace(asked, controller="oracle"), lab, say=silent)
+
+
+def test_the_window_that_shows_a_run_decides_nothing_about_it(
+    lab: Laboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rerun takes the run in the viewer's place, and is killed in the middle of it."""
+    number = tmp_path / "number"
+    rerun = Path(rerun_cli.__file__).with_name("rerun")
+    script = f'echo $$ > {number}; exec {rerun} --save {tmp_path / "seen.rrd"} "$@"'
+    monkeypatch.setenv("RERUN_CLI_PATH", str(stand_in(tmp_path / "viewer", script)))
+    monkeypatch.setenv("DISPLAY", ":99")
+    settings = ServoSettings(steps=2)
+    opened: list[LiveView] = []
+    said: list[str] = []
+
+    def view() -> LiveView:
+        opened.append(LiveView())
+        return opened[-1]
+
+    def close() -> None:
+        opened[0].end()
+        assert ends(int(number.read_text()))
+
+    for name, controller in (("plain", Towards(UP)), ("shown", Towards(UP, after=1, event=close))):
+        trace = run_trial(
+            trial(tmp_path / name, settings=settings, recording=name == "shown"),
+            lab,
+            say=said.append,
+            controller=controller,
+            view=view if name == "shown" else None,
+        )
+        check_whole(tmp_path / name, trace, lab, "out_of_steps")
+    plain, shown = ((tmp_path / name / "run.mcap").read_bytes() for name in ("plain", "shown"))
+    assert plain == shown
+    assert said.count(LOST) == 1
+    steps = rows(
+        tmp_path / "shown/run.rrd", "/cloud/current", "Points3D:positions", timeline="step"
+    )
+    assert [index for index, _ in steps] == [0, 1, 2]
