@@ -17,6 +17,7 @@ Cloud = Float32[np.ndarray, "_ 3"]
 Nodes = Float32[np.ndarray, "_ 3"]
 Point = Float64[np.ndarray, "3"]
 Pose = Float64[np.ndarray, "4 4"]
+Poses = Float64[np.ndarray, "_ 4 4"]
 Joints = Float64[np.ndarray, "6"]
 JointPath = Float64[np.ndarray, "_ 6"]
 
@@ -38,6 +39,31 @@ class Transform(NamedTuple):
     translation: Point
     rotation: Float64[np.ndarray, "4"]
     """Unit quaternion, x y z w."""
+
+
+class LinkWay(NamedTuple):
+    """Where links stand in their parents at several times."""
+
+    names: Sequence[tuple[str, str]]
+    """Parent and child of each link."""
+    translations: Float64[np.ndarray, "_ _ 3"]
+    """By time and link, (n, k, 3)."""
+    rotations: Float64[np.ndarray, "_ _ 4"]
+    """Unit quaternions, x y z w, likewise."""
+
+
+class Gaps(NamedTuple):
+    """How far the points of a cloud and of the goal are from the nearest of the other."""
+
+    there: Float64[np.ndarray, "_"]
+    """From each point of the cloud to the goal, in metres."""
+    back: Float64[np.ndarray, "_"]
+    """From each point of the goal to the cloud."""
+
+    @property
+    def chamfer(self) -> float:
+        """The symmetric mean Chamfer distance, in metres."""
+        return float((np.mean(self.there) + np.mean(self.back)) / 2)
 
 
 TissueShape = Literal["box", "cylinder", "hemi_ellipsoid"]
@@ -212,6 +238,8 @@ class Step:
     """What is done about it; None at the last observation of a run, or of a grasp."""
     latency: Latency | None = None
     """How long it took, once that is known."""
+    gaps: Gaps | None = None
+    """What `chamfer` is the mean of, for those who draw it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,36 @@ def rotation_z(angle: float) -> Rotation3:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotations_z(angles: Float64[np.ndarray, "n"]) -> Float64[np.ndarray, "n 3 3"]:
+    """Return the rotations by `angles` about z."""
+    turns = np.zeros((len(angles), 3, 3))
+    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angles)
+    turns[:, 1, 0] = np.sin(angles)
+    turns[:, 0, 1] = -turns[:, 1, 0]
+    turns[:, 2, 2] = 1.0
+    return turns
+
+
+def about_z(
+    frames: Float64[np.ndarray, "... 4 4"],
+    *,
+    angles: Float64[np.ndarray, "..."],
+    distances: Float64[np.ndarray, "..."],
+) -> Float64[np.ndarray, "... 4 4"]:
+    """Return frames turned about their own z by `angles` and slid along it by `distances`.
+
+    Frames, angles and distances are repeated against each other as numpy does it.
+    """
+    c, s = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    shape = np.broadcast_shapes(frames.shape[:-2], angles.shape, distances.shape)
+    result = np.empty((*shape, 4, 4))
+    result[...] = frames
+    result[..., 0] = frames[..., 0] * c + frames[..., 1] * s
+    result[..., 1] = frames[..., 1] * c - frames[..., 0] * s
+    result[..., :3, 3] += frames[..., :3, 2] * distances[..., None]
+    return result
+
+
 def pose(rotation: Rotation3, translation: Point) -> Pose:
     """Return the 4x4 matrix of a rotation followed by a translation."""
     matrix = np.eye(4)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dnet.errors import Unreachable
-from dnet.planning.arm import METRES_PER_UNIT, Arm, Obstacle
+from dnet.planning.arm import METRES_PER_UNIT, Arm, FirstObstacle
 from dnet.types import JointPath, Joints, Point
 
 SPACING = 0.001
@@ -27,34 +26,29 @@ class Line:
     """What ended it, empty where nothing did."""
 
 
-def straight_line(arm: Arm, obstacle: Obstacle, start: Joints, displacement: Point) -> Line:
+def straight_line(
+    arm: Arm, first_obstacle: FirstObstacle, start: Joints, displacement: Point
+) -> Line:
     """Return the joint path that moves the tip straight by `displacement`, orientation kept.
 
     Args:
         arm: Whose tip moves.
-        obstacle: Says what is in the way, asked at every position, SPACING apart.
+        first_obstacle: Says what is in the way of positions SPACING apart.
         start: Joint positions to start from.
         displacement: Of the tip in the world, in metres.
     """
-    tip = arm.forward(start)
     count = max(1, int(np.ceil(np.linalg.norm(displacement) / SPACING)))
-    path = [start]
-    for step in range(1, count + 1):
-        target = tip.copy()
-        target[:3, 3] += displacement * step / count
-        try:
-            joints = arm.inverse(target, near=path[-1])
-        except Unreachable as error:
-            return Line(np.array(path), (step - 1) / count, str(error))
-        stop = _jump(path[-1], joints) or obstacle(joints)
-        if stop:
-            return Line(np.array(path), (step - 1) / count, stop)
-        path.append(joints)
-    return Line(np.array(path), 1.0, "")
-
-
-def _jump(before: Joints, after: Joints) -> str | None:
-    jump = float(np.linalg.norm((after - before) * METRES_PER_UNIT))
-    if jump > LARGEST_JUMP:
-        return f"the joints would jump by {jump * 1e3:.0f} mm of tip motion"
-    return None
+    tips = np.repeat(arm.forward(start)[None], count, axis=0)
+    tips[:, :3, 3] += displacement * (np.arange(1, count + 1) / count)[:, None]
+    found, fault = arm.inverse_along(tips, near=start)
+    path, stop = np.vstack([start, found]), "" if fault is None else str(fault)
+    jumps = np.linalg.norm(np.diff(path, axis=0) * METRES_PER_UNIT, axis=1)
+    if (jumps > LARGEST_JUMP).any():
+        last = int((jumps > LARGEST_JUMP).argmax())
+        path = path[: last + 1]
+        stop = f"the joints would jump by {jumps[last] * 1e3:.0f} mm of tip motion"
+    blocked = first_obstacle(path[1:])
+    if blocked is not None:
+        last, stop = blocked
+        path = path[: last + 1]
+    return Line(path, 1.0 if not stop else (len(path) - 1) / count, stop)

@@ -53,6 +53,11 @@ class ArmPlanner:
         self._checks += 1
         return self._surroundings.obstacle(joints)
 
+    def _first_obstacle(self, path: JointPath) -> tuple[int, str] | None:
+        found = self._surroundings.first_obstacle(path)
+        self._checks += len(path) if found is None else found[0] + 1
+        return found
+
     def plan(
         self, joints: tuple[Joints, Joints], displacement: Point, *, seed: int, waypoints: int = 0
     ) -> Plan:
@@ -74,7 +79,8 @@ class ArmPlanner:
             cut = f"cut to the first {waypoints} of {len(path) - 1} waypoints"
             status, path, reason = "partial", path[: waypoints + 1], cut
         path, times = timed(self._arm, path)
-        achieved = self._tip(path[-1]) - self._tip(start)
+        first, last = self._arm.forward_along(np.stack([start, path[-1]]))[:, :3, 3]
+        achieved = last - first
         return Plan(
             status=status,
             path=path,
@@ -92,7 +98,7 @@ class ArmPlanner:
         blocked = self._obstacle(start)
         if blocked:
             return "failed", start[None], f"the arm stands in the way: {blocked}"
-        line = straight_line(self._arm, self._obstacle, start, displacement)
+        line = straight_line(self._arm, self._first_obstacle, start, displacement)
         if line.fraction == 1.0:
             return "straight", line.path, ""
         detour, reason = self._detour(start, displacement, seed)
@@ -139,7 +145,7 @@ class ArmPlanner:
             off = self._excursion(found)
             if off > self._settings.excursion:
                 reason = f"the detour of {off * 1e3:.0f} mm is too wide"
-            elif all(self._obstacle(joints) is None for joints in found):
+            elif self._first_obstacle(found) is None:
                 return found, ""
             else:
                 reason = "the shortened path is not clear"
@@ -147,15 +153,11 @@ class ArmPlanner:
 
     def _excursion(self, path: JointPath) -> float:
         """Return how far the tip strays from the straight segment, in metres."""
-        tips = np.array([self._tip(joints) for joints in path])
+        tips = self._arm.forward_along(path)[:, :3, 3]
         chord = tips[-1] - tips[0]
         length = max(float(chord @ chord), 1e-18)
         along = np.clip((tips - tips[0]) @ chord / length, 0.0, 1.0)
         return float(np.linalg.norm(tips - tips[0] - along[:, None] * chord, axis=1).max())
-
-    def _tip(self, joints: Joints) -> Point:
-        tip: Point = self._arm.forward(joints)[:3, 3]
-        return tip
 
 
 def _densified(path: JointPath) -> JointPath:

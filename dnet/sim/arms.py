@@ -1,14 +1,15 @@
 """Two arms around the table: where they stand, how they point at the object, their link frames."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+from jaxtyping import Float64
 
 from dnet.geometry.pose import pose, rotation_x, rotation_z, transforms
 from dnet.sim.psm import JOINT_NAMES, Psm
-from dnet.sim.psm_links import LINK_JOINTS
-from dnet.types import ARMS, Joints, Point, Pose, Transform
+from dnet.sim.psm_links import LINK_JOINTS, MOVING, link_poses
+from dnet.types import ARMS, JointPath, Joints, LinkWay, Point, Pose, Transform
 
 HOME: Joints = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 """Joint positions to start a search from: the tool straight down, half inserted."""
@@ -78,16 +79,38 @@ class ArmModel:
 
         A link's name is the arm's, a slash, and the link's name in the URDF.
         """
-        names, frames = [], []
-        for name, arm, positions in zip(ARMS, self.placement.arms, joints, strict=True):
-            names.append(("world", f"{name}/base_link"))
-            frames.append(arm.base)
-            for link in LINK_JOINTS:
-                names.append((f"{name}/{link.parent}", f"{name}/{link.child}"))
-                frames.append(link.frame(positions))
-        return transforms(names, np.stack(frames))
+        translations, rotations = link_poses(np.stack(joints))
+        found: list[Transform] = []
+        for number, name in enumerate(ARMS):
+            found.append(self._bases[number])
+            poses = zip(_names(name), translations[number], rotations[number], strict=True)
+            found += [Transform(*pair, place, turn) for pair, place, turn in poses]
+        return found
+
+    def way(self, path: JointPath) -> LinkWay:
+        """Return those links of the moving arm that move, at every row of a joint path."""
+        translations, rotations = link_poses(path)
+        moving = list(MOVING)
+        names = _names(ARMS[1])
+        return LinkWay(
+            [names[number] for number in moving], translations[:, moving], rotations[:, moving]
+        )
+
+    def tips(self, path: JointPath) -> Float64[np.ndarray, "_ 3"]:
+        """Return where the moving arm's jaws meet at every row of a joint path, in the world."""
+        return self.placement.arms[1].forward_along(path)[:, :3, 3]
 
     def tip(self, joints: Joints) -> Point:
-        """Return where the moving arm's jaws meet, in the world."""
+        """Return where they meet at one position."""
         tip: Point = self.placement.arms[1].forward(joints)[:3, 3]
         return tip
+
+    @cached_property
+    def _bases(self) -> list[Transform]:
+        names = [("world", f"{name}/base_link") for name in ARMS]
+        return transforms(names, np.stack([arm.base for arm in self.placement.arms]))
+
+
+@cache
+def _names(arm: str) -> list[tuple[str, str]]:
+    return [(f"{arm}/{link.parent}", f"{arm}/{link.child}") for link in LINK_JOINTS]

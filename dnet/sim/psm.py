@@ -9,16 +9,18 @@ on -y.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan2, pi, sqrt
-from typing import Literal
+from math import pi
+from typing import Literal, NamedTuple
 
 import numpy as np
+from jaxtyping import Float64
 
 from dnet.errors import Unreachable
-from dnet.geometry.pose import inverse, pose, rotation_x, rotation_z
-from dnet.types import Joints, Pose
+from dnet.geometry.pose import about_z, inverse, pose, rotation_x, rotation_z, rotations_z
+from dnet.types import JointPath, Joints, Pose, Poses
 
 HALF = pi / 2
+UP, DOWN = rotation_x(HALF), rotation_x(-HALF)
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,6 @@ class DHJoint:
         offset = np.array([self.a, 0.0, 0.0]) + turn @ np.array([0.0, 0.0, self.d])
         return pose(turn @ rotation_z(self.theta), offset)
 
-    def frame(self, position: float) -> Pose:
-        """The joint's frame in the frame before it, at `position`."""
-        if self.kind == "revolute":
-            return self.origin @ pose(rotation_z(position), np.zeros(3))
-        return self.origin @ pose(np.eye(3), np.array([0.0, 0.0, position]))
-
 
 RCM_OFFSET = 0.4318
 """From the insertion joint's zero to the remote centre of motion, in metres."""
@@ -62,6 +58,8 @@ WRIST_LENGTH = 0.0091
 """From the wrist-pitch axis to the wrist-yaw axis, in metres."""
 JAW_LENGTH = 0.0102
 """From the wrist-yaw axis to the tip of the jaws, in metres (dvrk_model)."""
+LEAST_REACH = 1e-9
+"""Distance of the base from the wrist-yaw axis below which its direction is lost, in metres."""
 LEAST_DEPTH = 0.045
 """How far the wrist-pitch axis stays below the remote centre of motion, so that the whole wrist
 is out of the cannula, in metres."""
@@ -87,6 +85,11 @@ TIP = pose(np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]]), np.array([0.0, JAW_L
 """The tip of the closed jaws in the wrist-yaw frame: z along the jaws."""
 
 
+ORIGINS = np.stack([joint.origin for joint in JOINTS])
+TURNS = np.array([joint.kind == "revolute" for joint in JOINTS], dtype=np.float64)
+"""1 for a joint that turns, 0 for one that slides."""
+
+
 @dataclass(frozen=True, eq=False)
 class Psm:
     """One arm, standing somewhere in the world."""
@@ -101,10 +104,15 @@ class Psm:
 
     def forward(self, joints: Joints) -> Pose:
         """Return the tip of the jaws in the world, (4, 4)."""
-        matrix = self.base
-        for joint, position in zip(JOINTS, joints, strict=True):
-            matrix = matrix @ joint.frame(float(position))
-        return matrix @ TIP
+        return self.forward_along(joints[None])[0]
+
+    def forward_along(self, path: JointPath) -> Poses:
+        """Return the tip of the jaws in the world at every row of a joint path, (n, 4, 4)."""
+        frames = about_z(ORIGINS, angles=path * TURNS, distances=path * (1.0 - TURNS))
+        tips = self.base
+        for number in range(len(JOINTS)):
+            tips = tips @ frames[:, number]
+        return tips @ TIP
 
     def inverse(self, tip: Pose, *, near: Joints) -> Joints:
         """Return the joint positions that bring the tip to a pose, in closed form.
@@ -121,65 +129,100 @@ class Psm:
             Unreachable: If the pose is singular, too near the remote centre of motion, or
                 beyond a joint's limit; the message says which.
         """
-        local = inverse(self.base) @ tip
-        joints = _solve(local, tip)
-        turns = joints[3] + 2 * pi * np.array([-1.0, 0.0, 1.0])
-        allowed = turns[(turns >= LOWER[3]) & (turns <= UPPER[3])]
-        if len(allowed):
-            joints[3] = allowed[np.argmin(np.abs(allowed - near[3]))]
-        for joint, position in zip(JOINTS, joints, strict=True):
-            if not joint.lower - 1e-9 <= position <= joint.upper + 1e-9:
-                raise Unreachable(
-                    "tool pose",
-                    _point(tip),
-                    f"{joint.name} would be {position:.3f}, "
-                    f"limits {joint.lower:.3f} to {joint.upper:.3f}",
-                )
-        return joints
+        path, fault = self.inverse_along(tip[None], near=near)
+        if fault is not None:
+            raise fault
+        return path[0]
+
+    def inverse_along(self, tips: Poses, *, near: Joints) -> tuple[JointPath, Unreachable | None]:
+        """Return joint positions for poses of the tip that follow each other, as `inverse` does.
+
+        Each stays close to the one before it. Many together cost hardly more than one.
+
+        Args:
+            tips: Wanted poses of the tip in the world, (n, 4, 4).
+            near: Joint positions for the first to stay close to, (6,).
+
+        Returns:
+            Joint positions up to the first pose that is out of reach, (m, 6), m <= n, and why
+            that one is; None if all can be reached.
+        """
+        solved = _solve(inverse(self.base) @ tips)
+        path = solved.joints
+        _unwind(path[:, 3], near=float(near[3]))
+        beyond = (path < LOWER - 1e-9) | (path > UPPER + 1e-9)
+        singular, shallow = solved.reach < LEAST_REACH, solved.depth < LEAST_DEPTH
+        wrong = np.flatnonzero(singular | shallow | beyond.any(axis=1))
+        if not len(wrong):
+            return path, None
+        first = int(wrong[0])
+        if singular[first]:
+            why = "the wrist-yaw axis runs through the base"
+        elif shallow[first]:
+            why = (
+                f"the wrist is {solved.depth[first] * 1e3:.0f} mm from the remote centre of "
+                f"motion, must be at least {LEAST_DEPTH * 1e3:.0f} mm"
+            )
+        else:
+            number = int(beyond[first].argmax())
+            joint, position = JOINTS[number], path[first, number]
+            why = (
+                f"{joint.name} would be {position:.3f}, "
+                f"limits {joint.lower:.3f} to {joint.upper:.3f}"
+            )
+        x, y, z = tips[first, :3, 3].tolist()
+        return path[:first], Unreachable("tool pose", (x, y, z), why)
 
 
-def _solve(local: Pose, tip: Pose) -> Joints:
-    """Return the joint positions for a tip pose in the base frame, limits aside."""
+def _unwind(rolls: Float64[np.ndarray, "_"], *, near: float) -> None:
+    """Turn each roll by full turns to within its limits, as near as can be to the one before."""
+    for row, roll in enumerate(rolls.tolist()):
+        turns = (roll - 2 * pi, roll, roll + 2 * pi)
+        allowed = [turn for turn in turns if LOWER[3] <= turn <= UPPER[3]]
+        near = min(allowed, key=lambda turn: abs(turn - near), default=roll)
+        rolls[row] = near
+
+
+class _Solved(NamedTuple):
+    """Joint positions for tip poses in the base frame, limits aside."""
+
+    joints: JointPath
+    reach: Float64[np.ndarray, "_"]
+    """Distance of the base from the wrist-yaw axis, in metres; the pose is singular at 0."""
+    depth: Float64[np.ndarray, "_"]
+    """Distance of the wrist-pitch axis from the remote centre of motion, in metres."""
+
+
+def _solve(local: Poses) -> _Solved:
     wrist = local @ inverse(TIP)
-    yaw_axis = wrist[:3, 2]
+    yaw_axis, origin = wrist[:, :3, 2], wrist[:, :3, 3]
     # The wrist-pitch axis lies WRIST_LENGTH behind the wrist-yaw axis, towards the base.
-    flat = wrist[:3, 3] - (wrist[:3, 3] @ yaw_axis) * yaw_axis
-    length = sqrt(flat @ flat)
-    if length < 1e-9:
-        raise Unreachable("tool pose", _point(tip), "the wrist-yaw axis runs through the base")
-    along = flat / length
-    pitch_origin = wrist[:3, 3] - WRIST_LENGTH * along
-    depth = sqrt(pitch_origin @ pitch_origin)
-    if depth < LEAST_DEPTH:
-        raise Unreachable(
-            "tool pose",
-            _point(tip),
-            f"the wrist is {depth * 1e3:.0f} mm from the remote centre of motion, "
-            f"must be at least {LEAST_DEPTH * 1e3:.0f} mm",
-        )
-    shaft = pitch_origin / depth  # (sin q1 cos q2, -sin q2, -cos q1 cos q2)
-    pitch = float(np.arcsin(np.clip(-shaft[1], -1.0, 1.0)))
-    yaw = atan2(shaft[0], -shaft[2])
+    flat = origin - (origin * yaw_axis).sum(axis=1, keepdims=True) * yaw_axis
+    reach = np.linalg.norm(flat, axis=1)
+    along = flat / np.maximum(reach, LEAST_REACH)[:, None]
+    pitch_origin = origin - WRIST_LENGTH * along
+    depth = np.linalg.norm(pitch_origin, axis=1)
+    # (sin q1 cos q2, -sin q2, -cos q1 cos q2)
+    shaft = pitch_origin / np.maximum(depth, LEAST_REACH)[:, None]
+    pitch = np.arcsin(np.clip(-shaft[:, 1], -1.0, 1.0))
+    yaw = np.arctan2(shaft[:, 0], -shaft[:, 2])
     insertion = depth + RCM_OFFSET - TOOL_LENGTH
-    before_roll = (
-        rotation_x(HALF)
-        @ rotation_z(HALF + yaw)
-        @ rotation_x(-HALF)
-        @ rotation_z(pitch - HALF)
-        @ rotation_x(HALF)
-    )
-    pitch_axis = before_roll.T @ np.cross(along, yaw_axis)
-    roll = atan2(-pitch_axis[0], pitch_axis[1])
-    before_pitch = before_roll @ rotation_z(roll) @ rotation_x(-HALF)
-    direction = before_pitch.T @ along
-    wrist_pitch = atan2(direction[1], direction[0]) + HALF
-    before_yaw = before_pitch @ rotation_z(wrist_pitch - HALF) @ rotation_x(-HALF)
-    direction = before_yaw.T @ wrist[:3, 0]
-    wrist_yaw = atan2(direction[1], direction[0]) + HALF
-    joints = np.array([yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw])
-    joints[4:] = (joints[4:] + pi) % (2 * pi) - pi
-    return joints
+    before_roll = UP @ rotations_z(HALF + yaw) @ DOWN @ rotations_z(pitch - HALF) @ UP
+    pitch_axis = _seen_from(before_roll, np.cross(along, yaw_axis))
+    roll = np.arctan2(-pitch_axis[:, 0], pitch_axis[:, 1])
+    before_pitch = before_roll @ rotations_z(roll) @ DOWN
+    direction = _seen_from(before_pitch, along)
+    wrist_pitch = np.arctan2(direction[:, 1], direction[:, 0]) + HALF
+    before_yaw = before_pitch @ rotations_z(wrist_pitch - HALF) @ DOWN
+    direction = _seen_from(before_yaw, wrist[:, :3, 0])
+    wrist_yaw = np.arctan2(direction[:, 1], direction[:, 0]) + HALF
+    joints = np.column_stack([yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw])
+    joints[:, 4:] = (joints[:, 4:] + pi) % (2 * pi) - pi
+    return _Solved(joints, reach, depth)
 
 
-def _point(tip: Pose) -> tuple[float, float, float]:
-    return (float(tip[0, 3]), float(tip[1, 3]), float(tip[2, 3]))
+def _seen_from(
+    rotations: Float64[np.ndarray, "n 3 3"], vectors: Float64[np.ndarray, "n 3"]
+) -> Float64[np.ndarray, "n 3"]:
+    """Return vectors of one frame in frames that are turned in it."""
+    return np.einsum("nij,ni->nj", rotations, vectors)

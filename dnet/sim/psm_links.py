@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float64
 
-from dnet.geometry.pose import pose, rotation_x, rotation_z
+from dnet.geometry.pose import about_z, pose, quaternions, rotation_x, rotation_z
 from dnet.sim.psm import HALF, JOINT_NAMES, JOINTS, TIP
-from dnet.types import Joints, Pose
+from dnet.types import JointPath, Joints, Pose
 
 PIVOT_DISTANCE = 0.5185
 """From the remote centre of motion to the parallelogram's pivot along the yaw axis, in metres."""
@@ -44,15 +45,6 @@ class LinkJoint:
         if self.follows is None:
             return self.rest
         return self.sign * float(joints[JOINT_NAMES.index(self.follows)])
-
-    def frame(self, joints: Joints) -> Pose:
-        """Return the child link in the parent link, (4, 4)."""
-        position = self.position(joints)
-        if self.kind == "fixed":
-            return self.origin
-        if self.kind == "prismatic":
-            return self.origin @ pose(np.eye(3), np.array([0.0, 0.0, position]))
-        return self.origin @ pose(rotation_z(position), np.zeros(3))
 
 
 def _chain() -> tuple[LinkJoint, ...]:
@@ -110,3 +102,37 @@ LINK_JOINTS: tuple[LinkJoint, ...] = (
     ),
 )
 """Every joint of the URDF, parents before children; the last two close the parallelogram."""
+
+_ORIGINS = np.stack([link.origin for link in LINK_JOINTS])
+_TURNS = np.array([link.kind == "revolute" for link in LINK_JOINTS], dtype=np.float64)
+_RESTS = np.array([link.rest for link in LINK_JOINTS])
+_SIGNS = np.zeros((len(JOINT_NAMES), len(LINK_JOINTS)))
+for _column, _link in enumerate(LINK_JOINTS):
+    if _link.follows is not None:
+        _SIGNS[JOINT_NAMES.index(_link.follows), _column] = _link.sign
+
+
+MOVING = tuple(number for number, link in enumerate(LINK_JOINTS) if link.follows is not None)
+"""Which of the joints move when the arm does."""
+_QUATERNIONS = quaternions(_ORIGINS[:, :3, :3])
+
+
+def link_frames(path: JointPath) -> Float64[np.ndarray, "n links 4 4"]:
+    """Return every link in its parent at every row of a joint path, in the order of the joints."""
+    positions = path @ _SIGNS + _RESTS
+    return about_z(_ORIGINS, angles=positions * _TURNS, distances=positions * (1.0 - _TURNS))
+
+
+def link_poses(
+    path: JointPath,
+) -> tuple[Float64[np.ndarray, "n links 3"], Float64[np.ndarray, "n links 4"]]:
+    """Return the same as translations and unit quaternions x y z w, w >= 0."""
+    positions = path @ _SIGNS + _RESTS
+    slides = positions * (1.0 - _TURNS)
+    translations = _ORIGINS[:, :3, 3] + slides[..., None] * _ORIGINS[:, :3, 2]
+    half = positions * _TURNS / 2
+    c, s = np.cos(half), np.sin(half)
+    # The joint's own quaternion, then a turn about z.
+    x, y, z, w = _QUATERNIONS.T
+    turned = np.stack([x * c + y * s, y * c - x * s, z * c + w * s, w * c - z * s], axis=-1)
+    return translations, np.where(turned[..., 3:] < 0, -turned, turned)

@@ -36,6 +36,13 @@ Triple = tuple[float, float, float]
 
 def psm_urdf(name: str = "psm") -> str:
     """Return the URDF of one arm; its base frame is the remote centre of motion."""
+    robot = psm_tree(name)
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def psm_tree(name: str = "psm") -> ElementTree.Element:
+    """Return the same as a tree."""
     robot = ElementTree.Element("robot", name=name)
     for material, rgb in COLOURS.items():
         element = ElementTree.SubElement(robot, "material", name=material)
@@ -43,8 +50,7 @@ def psm_urdf(name: str = "psm") -> str:
     _add_links(robot)
     for joint in LINK_JOINTS:
         _add_joint(robot, joint)
-    ElementTree.indent(robot)
-    return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+    return robot
 
 
 def _add_links(robot: ElementTree.Element) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dnet.sim.arms import Placement
-from dnet.types import Joints, Point
+from dnet.types import JointPath, Joints, Point
 
 PLACEMENT = Placement()
 ARM = PLACEMENT.arms[1]
@@ -34,6 +34,13 @@ class Boxes:
         for low, high in self.boxes:
             if np.all(where > low) and np.all(where < high):
                 return "a box"
+        return None
+
+    def first_obstacle(self, path: JointPath) -> tuple[int, str] | None:
+        for row, joints in enumerate(path):
+            found = self.obstacle(joints)
+            if found is not None:
+                return row, found
         return None
 
 

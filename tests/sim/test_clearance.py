@@ -11,6 +11,7 @@ from dnet.geometry.camera import Camera
 from dnet.planning.planner import ArmPlanner
 from dnet.sim.arms import Placement
 from dnet.sim.clearance import Clearance
+from dnet.sim.psm import LOWER, UPPER
 from dnet.sim.scenes import Workspace, draw_displacement, draw_scene
 from dnet.types import Tissue
 
@@ -81,6 +82,31 @@ def test_every_random_motion_from_a_clear_grasp_is_reachable_and_clear(
         plan = planner.plan((holding, start), displacement, seed=0)
         assert plan.status == "straight", plan.reason
     assert blocked < 20
+
+
+def test_what_boxes_around_the_links_leave_out_bullet_finds_clear(clearance: Clearance) -> None:
+    """Asked about every row, Bullet finds no more in the way than where it is asked."""
+    random = np.random.default_rng(5)
+    path = np.stack([random.uniform(LOWER, UPPER) for _ in range(400)])
+    holding = path[0] * 0.3
+    try:
+        clearance.stand(holding)
+        everywhere = [clearance._touched(joints) is not None for joints in path]
+        asked = clearance._suspects(path)
+        assert not np.any(np.array(everywhere) & ~asked)
+        assert 10 < np.sum(everywhere) < 390
+        assert np.mean(asked) < 0.95
+        first = clearance.first_obstacle(path)
+        assert first is not None
+        assert first[0] == everywhere.index(True)
+    finally:
+        clearance.stand(PLACE.joints_at(0, np.array([-0.045, 0.0, 0.04])))
+
+
+def test_bullet_is_asked_of_few_positions_of_a_usual_motion(clearance: Clearance) -> None:
+    tips = np.array([0.045, 0.0, 0.04]) + np.linspace(0, 1, 50)[:, None] * [0.0, 0.04, 0.03]
+    path = np.stack([PLACE.joints_at(1, tip) for tip in tips])
+    assert not clearance._suspects(path).any()
 
 
 def test_the_arm_cannot_reach_the_other_side_of_the_table() -> None:

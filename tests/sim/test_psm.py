@@ -1,12 +1,13 @@
 """The arm's kinematics are consistent with themselves and with Bullet's."""
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -14,8 +15,8 @@ from dnet.errors import Unreachable
 from dnet.geometry.pose import pose, rotation_x, rotation_z
 from dnet.sim.arms import ArmModel, Placement
 from dnet.sim.bullet import pybullet, quiet
-from dnet.sim.psm import JOINT_NAMES, LOWER, UPPER, Psm
-from dnet.sim.psm_links import LINK_JOINTS
+from dnet.sim.psm import JOINT_NAMES, LOWER, TIP, UPPER, Psm
+from dnet.sim.psm_links import LINK_JOINTS, link_frames
 from dnet.sim.urdf import psm_urdf
 from dnet.types import ARMS
 
@@ -24,6 +25,7 @@ ARM = Psm(pose(rotation_z(0.7) @ rotation_x(0.2), np.array([0.1, -0.2, 0.3])))
 shares = hnp.arrays(np.float64, 6, elements=st.floats(0.0, 1.0))
 
 
+@settings(deadline=None)
 @given(share=shares)
 def test_inverse_kinematics_round_trips(share: np.ndarray) -> None:
     joints = LOWER + share * (UPPER - LOWER)
@@ -34,6 +36,33 @@ def test_inverse_kinematics_round_trips(share: np.ndarray) -> None:
     np.testing.assert_allclose(ARM.forward(found), tip, atol=1e-9)
     assert np.all(found >= LOWER - 1e-9)
     assert np.all(found <= UPPER + 1e-9)
+
+
+@settings(deadline=None, max_examples=40)
+@given(share=shares)
+def test_poses_that_follow_each_other_are_solved_as_one_after_the_other(share: np.ndarray) -> None:
+    first = LOWER + share * (UPPER - LOWER)
+    first[2] = 0.065 + share[2] * (UPPER[2] - 0.065)
+    # On the way one joint leaves its limits.
+    path = first + np.linspace(0.0, 1.2, 7)[:, None] * np.array([0.4, 0.2, 0.05, 3.0, 0.3, -0.3])
+    tips = ARM.forward_along(path)
+    np.testing.assert_array_equal(tips, [ARM.forward(joints) for joints in path])
+    together, fault = ARM.inverse_along(tips, near=first)
+    near = first
+    for tip, found in zip(tips, together, strict=False):
+        near = ARM.inverse(tip, near=near)
+        np.testing.assert_allclose(found, near, atol=1e-12)
+    if fault is None:
+        assert len(together) == len(tips)
+    else:
+        with pytest.raises(Unreachable, match=re.escape(str(fault))):
+            ARM.inverse(tips[len(together)], near=near)
+
+
+def test_a_pose_without_a_direction_is_out_of_reach() -> None:
+    tip = ARM.base @ pose(np.eye(3), np.array([0.0, 0.0, 0.1])) @ TIP
+    with pytest.raises(Unreachable, match="the wrist-yaw axis runs through the base"):
+        ARM.inverse(tip, near=np.zeros(6))
 
 
 def test_the_roll_stays_on_the_branch_it_is_on() -> None:
@@ -108,12 +137,12 @@ def test_every_link_has_a_mass_and_every_joint_a_parent() -> None:
 
 def test_the_parallelogram_keeps_its_bar_parallel() -> None:
     """However far the arm pitches, the bar stays square to the yaw axis and reaches the rail."""
-    joints = {joint.name: joint for joint in LINK_JOINTS}
-    for pitch in (-0.8, 0.0, 0.5):
-        positions = np.array([0.3, pitch, 0.1, 0, 0, 0])
-        back = joints["pitch_back"].frame(positions)
-        bar = back @ joints["pitch_bar"].frame(positions)
-        rail = joints["pitch"].frame(positions)
+    names = [joint.name for joint in LINK_JOINTS]
+    path = np.array([[0.3, pitch, 0.1, 0, 0, 0] for pitch in (-0.8, 0.0, 0.5)])
+    for frames in link_frames(path):
+        back = frames[names.index("pitch_back")]
+        bar = back @ frames[names.index("pitch_bar")]
+        rail = frames[names.index("pitch")]
         np.testing.assert_allclose(np.abs(bar[:3, 0]), [0, 0, 1], atol=1e-12)
         np.testing.assert_allclose(back[:3, :3], rail[:3, :3], atol=1e-12)
 
@@ -136,7 +165,32 @@ def test_link_frames_lead_from_the_world_to_the_tips() -> None:
             matrix = pose(rotation, entry.translation) @ matrix
             child = entry.parent
         np.testing.assert_allclose(matrix[:3, 3], expected, atol=1e-9)
-    np.testing.assert_allclose(model.tip(joints[1]), [0.05, 0.02, 0.05], atol=1e-12)
+    np.testing.assert_allclose(model.tips(joints[1][None]), [[0.05, 0.02, 0.05]], atol=1e-12)
+
+
+def test_the_moving_arm_on_its_way_is_where_its_links_are_at_each_time() -> None:
+    placement = Placement()
+    model = ArmModel(placement)
+    holding = placement.joints_at(0, np.array([-0.045, 0.0, 0.04]))
+    first, last = (placement.joints_at(1, np.array([0.05, y, 0.05])) for y in (-0.03, 0.03))
+    path = np.linspace(first, last, 5)
+    way = model.way(path)
+    assert all(child.startswith(ARMS[1]) for _, child in way.names)
+    before = model.transforms((holding, path[0]))
+    for row, joints in enumerate(path):
+        entries = model.transforms((holding, joints))
+        moved = dict(zip(way.names, way.translations[row], strict=True))
+        turned = dict(zip(way.names, way.rotations[row], strict=True))
+        for entry, earlier in zip(entries, before, strict=True):
+            key = entry.parent, entry.child
+            if key in moved:
+                np.testing.assert_allclose(moved[key], entry.translation, atol=1e-12)
+                np.testing.assert_allclose(turned[key], entry.rotation, atol=1e-12)
+            else:
+                np.testing.assert_array_equal(entry.translation, earlier.translation)
+                np.testing.assert_array_equal(entry.rotation, earlier.rotation)
+    tips = np.linspace([0.05, -0.03, 0.05], [0.05, 0.03, 0.05], 2)
+    np.testing.assert_allclose(model.tips(np.stack([first, last])), tips, atol=1e-9)
 
 
 def test_the_tool_keeps_its_orientation_wherever_it_goes() -> None:
