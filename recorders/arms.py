@@ -5,9 +5,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
-from scipy.spatial.transform import Rotation
 
-from dnet.types import ARMS, Joints, Transform
+from dnet.types import ARMS, JointPath, Joints, LinkWay, Transform
+
+Quaternion = tuple[float, float, float, float]
 
 TIP = f"{ARMS[1]}/tip_link"
 """The frame at the tip of the moving arm's jaws."""
@@ -27,6 +28,19 @@ class ArmModel(Protocol):
         ...
 
 
+@runtime_checkable
+class MovingArms(ArmModel, Protocol):
+    """Both arms, as far as a viewer follows them on their way."""
+
+    def links(self, joints: tuple[Joints, Joints]) -> LinkWay:
+        """Return the same as `transforms`, at this one time."""
+        ...
+
+    def way(self, path: JointPath) -> LinkWay:
+        """Return those links of the moving arm that move, at every row of a joint path."""
+        ...
+
+
 def orientation_in_world(
     transforms: Sequence[Transform], child: str
 ) -> Float64[np.ndarray, "4"] | None:
@@ -34,11 +48,26 @@ def orientation_in_world(
     parents: Mapping[str, Transform] = {entry.child: entry for entry in transforms}
     if child not in parents:
         return None
-    rotation = Rotation.identity()
+    turn = (0.0, 0.0, 0.0, 1.0)
     seen = set[str]()
     while child in parents and child not in seen:
         seen.add(child)
         entry = parents[child]
-        rotation = Rotation.from_quat(entry.rotation) * rotation
+        x, y, z, w = entry.rotation.tolist()
+        turn = _after((x, y, z, w), turn)
         child = entry.parent
-    return np.asarray(rotation.as_quat(), dtype=np.float64)
+    result = np.array(turn)
+    return result / np.linalg.norm(result)
+
+
+def _after(second: Quaternion, first: Quaternion) -> Quaternion:
+    """Return the product of two quaternions, x y z w: `first`, then `second`."""
+    # A dozen products of single numbers: numpy would take ten times as long.
+    a, b, c, d = second
+    x, y, z, w = first
+    return (
+        d * x + a * w + b * z - c * y,
+        d * y + b * w + c * x - a * z,
+        d * z + c * w + a * y - b * x,
+        d * w - a * x - b * y - c * z,
+    )

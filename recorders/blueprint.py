@@ -8,6 +8,7 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TextLogColumnKind
 
 from dnet.recorders.frame_columns import GRIPPER
+from dnet.recorders.link_rows import WORLD, placed
 from dnet.recorders.rerun_scene import (
     CHAMFER,
     JOINTS,
@@ -17,9 +18,7 @@ from dnet.recorders.rerun_scene import (
     MOTION_LENGTH,
     NODES,
     TIME_TIMELINE,
-    WORLD,
     drawn_at,
-    placed,
 )
 from dnet.types import ARMS
 

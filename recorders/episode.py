@@ -40,7 +40,7 @@ from dnet.recorders.arms import TIP, ArmModel, orientation_in_world
 from dnet.recorders.json_text import to_json
 from dnet.recorders.mcap_sink import McapSink
 from dnet.recorders.step_text import describe_step
-from dnet.types import Cloud, EpisodeMeta, Frame, Nodes, Point, Step
+from dnet.types import Cloud, EpisodeMeta, Frame, Nodes, Point, Step, Transform
 
 SCHEMA_VERSION = "1"
 MANIPULATION_POINT_COLOR = (255, 60, 40)
@@ -79,7 +79,9 @@ class EpisodeWriter:
         self.path = path
         self.part = path.with_name(path.name + ".part")
         self._arms = arms
-        self._camera = camera
+        self._cameras: list[Transform] = []
+        if camera is not None:
+            self._cameras.append(transform(messages.WORLD, messages.CAMERA, camera.pose))
         self._times: list[int] = []
         path.parent.mkdir(parents=True, exist_ok=True)
         record = _meta_record(meta)
@@ -127,6 +129,7 @@ class EpisodeWriter:
         if frame.kind != "way":
             self.log(f"frame {len(self)}: {frame.kind}", time=frame.time)
         self._add(frame)
+        self._sink.flush()
 
     def set_goal(
         self,
@@ -198,9 +201,7 @@ class EpisodeWriter:
 
     def _add(self, frame: Frame) -> None:
         now = _nanoseconds(frame.time)
-        transforms = [*self._arms.transforms(frame.joints)]
-        if self._camera is not None:
-            transforms.append(transform(messages.WORLD, messages.CAMERA, self._camera.pose))
+        transforms = [*self._arms.transforms(frame.joints), *self._cameras]
         turned = orientation_in_world(transforms, TIP)
         point = messages.point_cloud(
             frame.grasp.astype(np.float32)[None], now, color=MANIPULATION_POINT_COLOR
@@ -225,7 +226,6 @@ class EpisodeWriter:
         index = len(self._times)
         self._sink.put_json("/frame", {"index": index, "kind": frame.kind, "time": frame.time}, now)
         self._times.append(now)
-        self._sink.flush()
 
     def _check(self, frame: Frame) -> None:
         now = _nanoseconds(frame.time)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -10,6 +9,7 @@ from jaxtyping import Float64
 
 from dnet.geometry.chamfer_to import ChamferTo
 from dnet.recorders.goal_distance import GoalDistance
+from dnet.recorders.link_rows import LinkRows, placed, time_column
 from dnet.recorders.rerun_scene import (
     CHAMFER,
     CURRENT,
@@ -19,15 +19,9 @@ from dnet.recorders.rerun_scene import (
     LOG,
     MANIPULATION_POINT,
     MOTION,
-    MOTION_COLOR,
     MOTION_LENGTH,
-    POINT_COLOR,
-    POINT_RADIUS,
     TIME_TIMELINE,
-    TRUE_COLOR,
     TRUE_MOTION,
-    framed,
-    placed,
 )
 from dnet.types import ARMS, Frame, Point, Transform
 
@@ -56,16 +50,14 @@ class FrameColumns:
         self, recording: rr.RecordingStream, *, plain: bool = True, place: str = ""
     ) -> None:
         self._recording, self._place = recording, place
-        # What never changes is said once, not at every frame. Points that are coloured by how far
-        # they are from the goal change: a colour that is said once would hide theirs.
-        current: dict[str, Any] = {"colors": CURRENT_COLOR} if plain else {}
-        looks = {
-            CURRENT: rr.Points3D.from_fields(radii=POINT_RADIUS, **current),
-            MANIPULATION_POINT: rr.Points3D.from_fields(colors=POINT_COLOR, radii=0.003),
-            MOTION: rr.Arrows3D.from_fields(colors=MOTION_COLOR, radii=0.0012),
-            TRUE_MOTION: rr.Arrows3D.from_fields(colors=TRUE_COLOR, radii=0.0007),
+        self._links = LinkRows(recording, place=place)
+        looks: dict[str, rr.AsComponents] = {
             GRIPPER: rr.SeriesLines(names=["x", "y", "z"], colors=AXIS_COLORS, widths=[2, 2, 2]),
         }
+        if plain:
+            # Points that are coloured by how far they are from the goal change: a colour that is
+            # said once would hide theirs.
+            looks[CURRENT] = rr.Points3D.from_fields(colors=CURRENT_COLOR)
         for entity, look in looks.items():
             recording.log(placed(place, entity), look, static=True)
 
@@ -106,8 +98,11 @@ class FrameColumns:
         colors = rr.Points3D.columns(colors=np.concatenate([one.colors for one in found]))
         self._send(block, CURRENT, colors.partition([len(one.colors) for one in found]), rows=rows)
         for name in found[0].figures:
-            values = [one.figures[name] for one in found]
-            self._send(block, DISTANCES[name], rr.Scalars.columns(scalars=values), rows=rows)
+            curves = [[one.figures[name] for one in found]]
+            if name in distance.floor:
+                curves.append([distance.floor[name]] * len(found))
+            values = rr.Scalars.columns(scalars=np.column_stack(curves))
+            self._send(block, DISTANCES[name], values, rows=rows)
         motions = [one.motion for one in found if one.motion is not None]
         if motions:
             origins = [block.frames[row].grasp for row in rows]
@@ -125,21 +120,9 @@ class FrameColumns:
             )
 
     def _send_transforms(self, block: Block) -> None:
-        # Nothing promises that all frames tell of the same links.
-        links: dict[str, tuple[list[int], list[Transform]]] = {}
-        for row, entries in enumerate(block.transforms):
-            for entry in entries:
-                rows, found = links.setdefault(entry.child, ([], []))
-                rows.append(row)
-                found.append(entry)
-        for child, (rows, found) in links.items():
-            columns = rr.Transform3D.columns(
-                translation=np.stack([entry.translation for entry in found]),
-                quaternion=np.stack([entry.rotation for entry in found]),
-                parent_frame=[framed(self._place, entry.parent) for entry in found],
-                child_frame=[framed(self._place, child)] * len(found),
-            )
-            self._send(block, f"tf/{child}", columns, rows=rows)
+        entries = [entry for frame in block.transforms for entry in frame]
+        at = [row for row, frame in enumerate(block.transforms) for _ in frame]
+        self._links.send(entries, _indexes(block, at))
 
     def _send(
         self,
@@ -153,12 +136,17 @@ class FrameColumns:
         at = range(len(block.frames)) if rows is None else rows
         self._recording.send_columns(
             placed(self._place, entity),
-            indexes=[
-                rr.TimeColumn(COUNTER, sequence=[block.first + row for row in at]),
-                rr.TimeColumn(TIME_TIMELINE, duration=[block.frames[row].time for row in at]),
-            ],
+            indexes=_indexes(block, at),
             columns=columns,
         )
+
+
+def _indexes(block: Block, rows: Sequence[int]) -> list[rr.TimeColumn]:
+    """Return when some rows of a block were, on both timelines."""
+    return [
+        rr.TimeColumn(COUNTER, sequence=[block.first + row for row in rows]),
+        time_column(TIME_TIMELINE, np.array([block.frames[row].time for row in rows])),
+    ]
 
 
 def _grasps(block: Block) -> Float64[np.ndarray, "_ 3"]:

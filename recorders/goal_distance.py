@@ -2,20 +2,21 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from jaxtyping import Float64, UInt8
 from matplotlib import colormaps
-from scipy.spatial import cKDTree
 
+from dnet.geometry.chamfer_to import ChamferTo
 from dnet.geometry.node_distance import node_distance
-from dnet.types import Cloud, Frame, Goal, Point
+from dnet.types import Frame, Gaps, Goal, Point
 
 Colors = UInt8[np.ndarray, "_ 3"]
 
 WORST = 0.02
 """Distance to the goal that has the colour of the worst, in metres."""
+SHADES = 256
 COLORMAP = "turbo"
 """From blue, at the goal, over green and yellow to red."""
 
@@ -37,39 +38,46 @@ class GoalDistance:
 
     def __init__(self, goal: Goal) -> None:
         self._goal = goal
-        self._tree = cKDTree(goal.cloud)
+        self._distance = ChamferTo(goal.cloud)
 
-    def __call__(self, frame: Frame) -> Distances:
-        """Return how far a frame with a cloud of one point or more is from the goal."""
+    def __call__(self, frame: Frame, gaps: Gaps | None = None) -> Distances:
+        """Return how far a frame with a cloud of one point or more is from the goal.
+
+        Args:
+            frame: What was seen.
+            gaps: Of its cloud and the goal, if they are known already: they take the most time.
+        """
         goal = self._goal
-        there, figures = self._figures(frame.cloud)
+        gaps = self._distance.gaps(frame.cloud) if gaps is None else gaps
+        figures = _figures(gaps)
         nodes = node_distance(frame.nodes, goal.nodes)
         if np.isfinite(nodes):
             figures["nodes"] = 1e3 * nodes
         motion = None if goal.grasp is None else goal.grasp - frame.grasp
-        return Distances(colors_of(there), figures, motion)
-
-    def _figures(self, cloud: Cloud) -> tuple[Float64[np.ndarray, "_"], dict[str, float]]:
-        """Return the distance of each point to the goal, and what follows from both clouds."""
-        there, _ = self._tree.query(cloud)
-        back, _ = cKDTree(cloud, balanced_tree=False, compact_nodes=False).query(self._goal.cloud)
-        figures = {
-            "chamfer": 1e3 * (float(np.mean(there)) + float(np.mean(back))) / 2,
-            "legacy": float(np.linalg.norm(back)),
-        }
-        return np.asarray(there, dtype=np.float64), figures
+        return Distances(colors_of(gaps.there), figures, motion)
 
     @cached_property
     def floor(self) -> Mapping[str, float]:
         """The least that each curve can be expected to come to, where that is known."""
         again = self._goal.again
-        return {} if again is None else self._figures(again)[1]
+        return {} if again is None else _figures(self._distance.gaps(again))
+
+
+def _figures(gaps: Gaps) -> dict[str, float]:
+    return {"chamfer": 1e3 * gaps.chamfer, "legacy": float(np.linalg.norm(gaps.back))}
 
 
 def colors_of(distances: Float64[np.ndarray, "_"]) -> Colors:
     """Return a colour for each distance, in metres."""
     shares = np.clip(distances / WORST, 0.0, 1.0)
+    colors: Colors = _table()[(shares * (SHADES - 1)).astype(np.int64)]
+    return colors
+
+
+@cache
+def _table() -> Colors:
     table: Callable[..., np.ndarray] = colormaps[COLORMAP]
     # The dark ends of the colour map would be lost on the dark ground.
-    colors: Colors = table(0.08 + 0.84 * shares, bytes=True)[:, :3].copy()
+    shares = 0.08 + 0.84 * np.linspace(0.0, 1.0, SHADES)
+    colors: Colors = table(shares, bytes=True)[:, :3].copy()
     return colors

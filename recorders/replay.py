@@ -218,8 +218,6 @@ def _replay_run(
             columns.send_errors(block, distance)
         for index, one in enumerate(block.frames, start=block.first):
             seen[one.time] = index, one.grasp
-    if distance is not None and seen:
-        scene.log_floor(distance.floor, (min(seen), max(seen)))
     for step in episode.steps():
         if step["time"] in seen:
             index, grasp = seen[step["time"]]

@@ -9,13 +9,13 @@ import rerun as rr
 from jaxtyping import Float64
 
 from dnet.errors import OccupiedOutput
-from dnet.recorders.arms import ArmModel
+from dnet.recorders.arms import MovingArms
 from dnet.recorders.blueprint import SERVO_APPLICATION, servo_blueprint
 from dnet.recorders.goal_distance import GoalDistance
-from dnet.recorders.rerun_scene import CHAMFER, RerunScene, transforms_along
+from dnet.recorders.rerun_scene import CHAMFER, RerunScene
 from dnet.recorders.run_sinks import OpenView, RunSinks
 from dnet.recorders.step_text import describe_step
-from dnet.types import Cloud, Frame, Goal, JointPath, Step
+from dnet.types import Cloud, Frame, Goal, JointPath, Joints, Step
 
 
 class RerunRun:
@@ -41,7 +41,7 @@ class RerunRun:
         path: Path,
         *,
         name: str,
-        arms: ArmModel,
+        arms: MovingArms,
         urdf: str,
         view: OpenView | None = None,
         say: Callable[[str], None] = print,
@@ -63,7 +63,6 @@ class RerunRun:
         self._scene.name_joints(arms.joint_names)
         self._closed = False
         self._distance: GoalDistance | None = None
-        self._began: float | None = None
 
     def __enter__(self) -> "RerunRun":
         return self
@@ -109,17 +108,13 @@ class RerunRun:
         self._now, self._step = frame.time, index
         scene = self._scene
         scene.set_time(frame.time, count=index)
-        distances = None if self._distance is None else self._distance(frame)
-        scene.log_frame(frame, self._arms.transforms(frame.joints), distances)
+        distances = None if self._distance is None else self._distance(frame, step.gaps)
+        floor = None if self._distance is None else self._distance.floor
+        scene.log_frame(frame, self._arms.links(frame.joints), distances, floor=floor)
         scene.log_motion(frame.grasp, step.motion)
         scene.log_tip_path(tip_path)
         if self._distance is None:
             scene.log_scalar(CHAMFER, 1e3 * step.chamfer)
-        elif self._began is None:
-            self._began = frame.time
-        else:
-            scene.log_floor(self._distance.floor, (self._began, frame.time))
-            scene.set_time(frame.time, count=index)
         troubled = plan is not None and plan.status in ("partial", "failed")
         scene.log_text(describe_step(step, index), level="WARN" if troubled else "INFO")
         self._sinks.flush()
@@ -127,21 +122,23 @@ class RerunRun:
     def log_frame(self, frame: Frame) -> None:
         """Log a frame that was seen on the way from one step to the next."""
         self._scene.set_time(frame.time)
-        self._scene.log_frame(frame, self._arms.transforms(frame.joints))
+        self._scene.log_frame(frame, self._arms.links(frame.joints))
         self._sinks.flush()
 
-    def arms_along(
-        self, times: Float64[np.ndarray, "_"], joints: tuple[JointPath, JointPath]
-    ) -> None:
-        """Log the arms on their way between two steps, so that playback is smooth.
+    def log_pose(self, joints: tuple[Joints, Joints], *, time: float) -> None:
+        """Log how both arms stand, outside of any step; it is flushed with what comes next."""
+        self._scene.set_time(time)
+        self._scene.log_links(self._arms.links(joints))
+        self._scene.log_joints(joints)
+
+    def log_way(self, times: Float64[np.ndarray, "_"], path: JointPath) -> None:
+        """Log the moving arm on its way, so that playback is smooth; it is flushed likewise.
 
         Args:
             times: Seconds of simulation, (n,).
-            joints: Positions of the holding and the moving arm at those times, (n, 6) each.
+            path: Its joint positions at those times, (n, 6).
         """
-        self._scene.log_transforms_along(times, transforms_along(self._arms, joints))
-        self._scene.log_joints_along(times, joints)
-        self._sinks.flush()
+        self._scene.log_way(times, path, self._arms.way(path))
 
     def log_text(self, message: str, *, time: float | None = None) -> None:
         """Log a line for people, at `time` or at that of the last step."""

@@ -12,11 +12,10 @@ import rerun as rr
 from jaxtyping import Float64
 from rerun.urdf import UrdfTree
 
-from dnet.recorders.arms import ArmModel
 from dnet.recorders.goal_distance import Colors, Distances
-from dnet.types import ARMS, Cloud, Frame, JointPath, Joints, Latency, Point, Transform
+from dnet.recorders.link_rows import WORLD, LinkRows, framed, placed, time_column
+from dnet.types import ARMS, Cloud, Frame, JointPath, Joints, Latency, LinkWay, Point
 
-WORLD = "world"
 TIME_TIMELINE = "sim_time"
 
 CURRENT, GOAL = "cloud/current", "cloud/goal"
@@ -62,13 +61,17 @@ class RerunScene:
         self._counter = counter
         # Entities without a named frame hang on the implicit root, which stands in the world.
         recording.log("/", rr.Transform3D(parent_frame=WORLD, child_frame="tf#/"), static=True)
+        self._links = LinkRows(recording, place=place)
+        self._now: tuple[float, int | None] = (0.0, None)
         self._log_table()
+        self._log_looks()
         if urdf:
             self._log_arms(urdf)
         self._name_series()
 
     def set_time(self, seconds: float, *, count: int | None = None) -> None:
         """Set where on the timelines the next values go; without a count, on time alone."""
+        self._now = seconds, count
         self.recording.set_time(TIME_TIMELINE, duration=seconds)
         if count is None:
             self.recording.disable_timeline(self._counter)
@@ -90,104 +93,83 @@ class RerunScene:
     def log_cloud(self, cloud: Cloud, colors: Colors | None = None) -> None:
         """Log the visible surface, in one colour or each point in its own."""
         chosen = CURRENT_COLOR if colors is None else colors
-        points = rr.Points3D(_aligned(cloud), colors=chosen, radii=POINT_RADIUS)
-        self._log(CURRENT, points)
+        self._log(CURRENT, rr.Points3D(_aligned(cloud), colors=chosen))
 
     def log_manipulation_point(self, point: Point) -> None:
         """Log where the moving arm holds the object."""
-        self._log(MANIPULATION_POINT, rr.Points3D([point], colors=POINT_COLOR, radii=0.003))
+        self._log(MANIPULATION_POINT, rr.Points3D([point]))
 
     def log_frame(
-        self, frame: Frame, transforms: Sequence[Transform], distances: Distances | None = None
+        self,
+        frame: Frame,
+        links: LinkWay,
+        distances: Distances | None = None,
+        *,
+        floor: Mapping[str, float] | None = None,
     ) -> None:
         """Log what was seen and where the arms were, and how far it is from the goal."""
         self.log_cloud(frame.cloud, None if distances is None else distances.colors)
         if distances is not None:
-            self.log_distances(frame.grasp, distances)
+            self.log_distances(frame.grasp, distances, floor or {})
         self.log_manipulation_point(frame.grasp)
-        self.log_transforms(transforms)
+        self.log_links(links)
         self.log_joints(frame.joints)
 
     def log_motion(self, grasp: Point, motion: Point) -> None:
         """Log a motion of the grasp as an arrow, and its length as a curve."""
-        arrow = rr.Arrows3D(origins=[grasp], vectors=[motion], colors=MOTION_COLOR, radii=0.0012)
-        self._log(MOTION, arrow)
+        self._log(MOTION, rr.Arrows3D(origins=[grasp], vectors=[motion]))
         self.log_scalar(MOTION_LENGTH, 1e3 * float(np.linalg.norm(motion)))
 
-    def log_distances(self, grasp: Point, distances: Distances) -> None:
-        """Log curves of how far a frame is from the goal, and the true motion as an arrow."""
-        for name, value in distances.figures.items():
-            self.log_scalar(DISTANCES[name], value)
-        if distances.motion is not None:
-            arrow = rr.Arrows3D(
-                origins=[grasp], vectors=[distances.motion], colors=TRUE_COLOR, radii=0.0007
-            )
-            self._log(TRUE_MOTION, arrow)
+    def log_distances(self, grasp: Point, distances: Distances, floor: Mapping[str, float]) -> None:
+        """Log how far a frame is from the goal as curves, and the true motion as an arrow.
 
-    def log_floor(self, floor: Mapping[str, float], times: tuple[float, float]) -> None:
-        """Log the least that each curve can be expected to come to, from one time to another."""
-        for name, value in floor.items():
-            self.recording.send_columns(
-                placed(self.place, f"{DISTANCES[name]}/floor"),
-                indexes=[rr.TimeColumn(TIME_TIMELINE, duration=times)],
-                columns=rr.Scalars.columns(scalars=[value, value]),
-            )
+        Args:
+            grasp: Where the arrow begins.
+            distances: Of the frame.
+            floor: The least that each curve can be expected to come to, drawn beside it.
+        """
+        for name, value in distances.figures.items():
+            # Two curves of one entity cost half of what two entities would.
+            values = [value, floor[name]] if name in floor else [value]
+            self._log(DISTANCES[name], rr.Scalars(values))
+        if distances.motion is not None:
+            self._log(TRUE_MOTION, rr.Arrows3D(origins=[grasp], vectors=[distances.motion]))
 
     def log_tip_path(self, path: Float64[np.ndarray, "_ 3"] | None) -> None:
         """Log where the tip of the moving arm is planned to go."""
         if path is None or len(path) < 2:
             self._log(TIP_PATH, rr.Clear(recursive=False))
             return
-        self._log(TIP_PATH, rr.LineStrips3D([path], colors=PATH_COLOR, radii=0.0008))
+        self._log(TIP_PATH, rr.LineStrips3D([path]))
 
-    def log_transforms(self, transforms: Sequence[Transform]) -> None:
+    def log_links(self, links: LinkWay) -> None:
         """Log where every link of both arms stands."""
-        for entry in transforms:
-            self._log(
-                f"tf/{entry.child}",
-                rr.Transform3D(
-                    translation=entry.translation,
-                    quaternion=rr.Quaternion(xyzw=entry.rotation),
-                    parent_frame=framed(self.place, entry.parent),
-                    child_frame=framed(self.place, entry.child),
-                ),
-            )
+        (seconds, count), size = self._now, len(links.names)
+        indexes = [time_column(TIME_TIMELINE, np.full(size, seconds))]
+        if count is not None:
+            indexes.append(rr.TimeColumn(self._counter, sequence=np.full(size, count)))
+        self._links.send_way(links, indexes)
 
-    def log_transforms_along(
-        self, times: Float64[np.ndarray, "_"], rows: Sequence[Sequence[Transform]]
-    ) -> None:
-        """Log the links of both arms at each of `times`, on the time line alone."""
-        if not rows:
-            return
-        when = rr.TimeColumn(TIME_TIMELINE, duration=times)
-        for column in zip(*rows, strict=True):
-            self.recording.send_columns(
-                placed(self.place, f"tf/{column[0].child}"),
-                indexes=[when],
-                columns=rr.Transform3D.columns(
-                    translation=np.stack([entry.translation for entry in column]),
-                    quaternion=np.stack([entry.rotation for entry in column]),
-                    parent_frame=[framed(self.place, entry.parent) for entry in column],
-                    child_frame=[framed(self.place, entry.child) for entry in column],
-                ),
-            )
+    def log_way(self, times: Float64[np.ndarray, "_"], path: JointPath, links: LinkWay) -> None:
+        """Log the moving arm on its way, at each of `times`, on the time line alone.
+
+        Args:
+            times: In seconds, (n,).
+            path: Its joint positions at those times.
+            links: Those of its links that move.
+        """
+        indexes = [time_column(TIME_TIMELINE, np.repeat(times, len(links.names)))]
+        self._links.send_way(links, indexes)
+        self.recording.send_columns(
+            placed(self.place, f"{JOINTS}/{ARMS[1]}"),
+            indexes=[time_column(TIME_TIMELINE, times)],
+            columns=rr.Scalars.columns(scalars=path),
+        )
 
     def log_joints(self, joints: tuple[Joints, Joints]) -> None:
         """Log the joint positions of both arms as curves."""
         for arm, positions in zip(ARMS, joints, strict=True):
             self._log(f"{JOINTS}/{arm}", rr.Scalars(positions))
-
-    def log_joints_along(
-        self, times: Float64[np.ndarray, "_"], joints: tuple[JointPath, JointPath]
-    ) -> None:
-        """Log the joint positions at each of `times`, on the time line alone."""
-        when = rr.TimeColumn(TIME_TIMELINE, duration=times)
-        for arm, path in zip(ARMS, joints, strict=True):
-            self.recording.send_columns(
-                placed(self.place, f"{JOINTS}/{arm}"),
-                indexes=[when],
-                columns=rr.Scalars.columns(scalars=path),
-            )
 
     def log_scalar(self, entity: str, value: float) -> None:
         """Log one figure of a curve."""
@@ -206,6 +188,18 @@ class RerunScene:
         for arm in ARMS:
             series = rr.SeriesLines(names=[f"{arm} {name}" for name in names])
             self._static(f"{JOINTS}/{arm}", series)
+
+    def _log_looks(self) -> None:
+        # What never changes is said once, not with every value.
+        looks = {
+            CURRENT: rr.Points3D.from_fields(radii=POINT_RADIUS),
+            MANIPULATION_POINT: rr.Points3D.from_fields(colors=POINT_COLOR, radii=0.003),
+            MOTION: rr.Arrows3D.from_fields(colors=MOTION_COLOR, radii=0.0012),
+            TRUE_MOTION: rr.Arrows3D.from_fields(colors=TRUE_COLOR, radii=0.0007),
+            TIP_PATH: rr.LineStrips3D.from_fields(colors=PATH_COLOR, radii=0.0008),
+        }
+        for entity, look in looks.items():
+            self._static(entity, look)
 
     def _log_table(self) -> None:
         x, y, z = TABLE_SIZE
@@ -234,15 +228,17 @@ class RerunScene:
                 self.recording.send_chunks(shapes.drop(content=collision))
 
     def _name_series(self) -> None:
-        self._static(CHAMFER, rr.SeriesLines(names="Chamfer (mm)", colors=CURRENT_COLOR, widths=2))
-        self._static(
-            MOTION_LENGTH, rr.SeriesLines(names="motion (mm)", colors=MOTION_COLOR, widths=2)
-        )
-        self._static(LEGACY, rr.SeriesLines(names="legacy norm", colors=CURRENT_COLOR, widths=2))
-        self._static(NODES, rr.SeriesLines(names="nodes (mm)", colors=POINT_COLOR, widths=2))
-        for entity in DISTANCES.values():
-            floor = rr.SeriesLines(names="floor", colors=FLOOR_COLOR, widths=1)
-            self._static(f"{entity}/floor", floor)
+        motion = rr.SeriesLines(names="motion (mm)", colors=MOTION_COLOR, widths=2)
+        self._static(MOTION_LENGTH, motion)
+        for entity, name, color in (
+            (CHAMFER, "Chamfer (mm)", CURRENT_COLOR),
+            (LEGACY, "legacy norm", CURRENT_COLOR),
+            (NODES, "nodes (mm)", POINT_COLOR),
+        ):
+            series = rr.SeriesLines(
+                names=[name, "floor"], colors=[color, FLOOR_COLOR], widths=[2, 1]
+            )
+            self._static(entity, series)
         self._static(LATENCY, rr.SeriesLines(names=list(STAGES)))
 
     def _log(self, entity: str, value: rr.AsComponents) -> None:
@@ -250,16 +246,6 @@ class RerunScene:
 
     def _static(self, entity: str, value: rr.AsComponents) -> None:
         self.recording.log(placed(self.place, entity), value, static=True)
-
-
-def placed(place: str, entity: str) -> str:
-    """Return where an entity of the scene at `place` hangs."""
-    return f"{place}/{entity}" if place else entity
-
-
-def framed(place: str, frame: str) -> str:
-    """Return what a frame of the scene at `place` is called; all scenes stand in one world."""
-    return frame if not place or frame == WORLD else f"{place}.{frame}"
 
 
 def drawn_at(place: str, arm: str) -> str:
@@ -273,11 +259,3 @@ def _aligned(cloud: Cloud) -> Cloud:
     Rerun ends the whole process on such an array.
     """
     return np.require(cloud, dtype=np.float32, requirements=["C", "ALIGNED"])
-
-
-def transforms_along(
-    arms: ArmModel, joints: tuple[JointPath, JointPath]
-) -> list[Sequence[Transform]]:
-    """Return the link frames at every row of two joint paths."""
-    holding, moving = joints
-    return [arms.transforms((left, right)) for left, right in zip(holding, moving, strict=True)]

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dnet.types import Cloud
+from dnet.types import Cloud, Gaps
 
 
 class ChamferTo:
@@ -19,8 +19,12 @@ class ChamferTo:
 
     def __call__(self, cloud: Cloud) -> float:
         """Return how far `cloud`, of one point or more, is from the reference, in metres."""
+        return self.gaps(cloud).chamfer
+
+    def gaps(self, cloud: Cloud) -> Gaps:
+        """Return the distances, both ways, that this is the mean of."""
         # A tree for one search: one that is balanced takes longer to build than it saves.
         tree = cKDTree(cloud, balanced_tree=False, compact_nodes=False)
         there, _ = self._tree.query(cloud)
         back, _ = tree.query(self._reference)
-        return float((np.mean(there) + np.mean(back)) / 2)
+        return Gaps(np.asarray(there, dtype=np.float64), np.asarray(back, dtype=np.float64))

@@ -166,7 +166,7 @@ class _Run:
         if not slip <= self._settings.slip:
             off = f"what was held is {slip * 1e3:.0f} mm off the jaws"
             raise _End("grasp_lost", off if np.isfinite(slip) else "the jaws are open", frame)
-        distance = self._distance(frame.cloud)
+        gaps = self._distance.gaps(frame.cloud)
         seen = perf_counter()
         motion = self._around.controller.predict(frame.cloud, self._goal.cloud)
         if not np.isfinite(motion).all():
@@ -175,7 +175,7 @@ class _Run:
         latency = Latency((seen - clock) * 1e3, (perf_counter() - seen) * 1e3)
         if self._start is None:
             self._start = frame.time
-        return Step(frame, distance, motion, latency=latency)
+        return Step(frame, gaps.chamfer, motion, latency=latency, gaps=gaps)
 
     def _look(self) -> Frame:
         """Return what is seen; a camera that drops a frame is asked again."""

@@ -6,7 +6,7 @@ from functools import cache, cached_property
 import numpy as np
 from jaxtyping import Float64
 
-from dnet.geometry.pose import pose, rotation_x, rotation_z, transforms
+from dnet.geometry.pose import pose, quaternions, rotation_x, rotation_z
 from dnet.sim.psm import JOINT_NAMES, Psm
 from dnet.sim.psm_links import LINK_JOINTS, MOVING, link_poses
 from dnet.types import ARMS, JointPath, Joints, LinkWay, Point, Pose, Transform
@@ -79,19 +79,25 @@ class ArmModel:
 
         A link's name is the arm's, a slash, and the link's name in the URDF.
         """
-        translations, rotations = link_poses(np.stack(joints))
-        found: list[Transform] = []
-        for number, name in enumerate(ARMS):
-            found.append(self._bases[number])
-            poses = zip(_names(name), translations[number], rotations[number], strict=True)
-            found += [Transform(*pair, place, turn) for pair, place, turn in poses]
-        return found
+        names, (translations,), (rotations,) = self.links(joints)
+        poses = zip(names, translations, rotations, strict=True)
+        return [Transform(*pair, place, turn) for pair, place, turn in poses]
+
+    def links(self, joints: tuple[Joints, Joints]) -> LinkWay:
+        """Return the same as `transforms`, at this one time."""
+        places, turns = link_poses(np.stack(joints))
+        base_places, base_turns = self._bases
+        return LinkWay(
+            _names(),
+            np.concatenate([base_places, places], axis=1).reshape(1, -1, 3),
+            np.concatenate([base_turns, turns], axis=1).reshape(1, -1, 4),
+        )
 
     def way(self, path: JointPath) -> LinkWay:
         """Return those links of the moving arm that move, at every row of a joint path."""
         translations, rotations = link_poses(path)
         moving = list(MOVING)
-        names = _names(ARMS[1])
+        names = _names()[-len(LINK_JOINTS) :]
         return LinkWay(
             [names[number] for number in moving], translations[:, moving], rotations[:, moving]
         )
@@ -100,17 +106,17 @@ class ArmModel:
         """Return where the moving arm's jaws meet at every row of a joint path, in the world."""
         return self.placement.arms[1].forward_along(path)[:, :3, 3]
 
-    def tip(self, joints: Joints) -> Point:
-        """Return where they meet at one position."""
-        tip: Point = self.placement.arms[1].forward(joints)[:3, 3]
-        return tip
-
     @cached_property
-    def _bases(self) -> list[Transform]:
-        names = [("world", f"{name}/base_link") for name in ARMS]
-        return transforms(names, np.stack([arm.base for arm in self.placement.arms]))
+    def _bases(self) -> tuple[Float64[np.ndarray, "2 1 3"], Float64[np.ndarray, "2 1 4"]]:
+        bases = np.stack([arm.base for arm in self.placement.arms])
+        return bases[:, None, :3, 3], quaternions(bases[:, :3, :3])[:, None]
 
 
 @cache
-def _names(arm: str) -> list[tuple[str, str]]:
-    return [(f"{arm}/{link.parent}", f"{arm}/{link.child}") for link in LINK_JOINTS]
+def _names() -> list[tuple[str, str]]:
+    """Return parent and child of every link of both arms."""
+    names: list[tuple[str, str]] = []
+    for arm in ARMS:
+        names.append(("world", f"{arm}/base_link"))
+        names += [(f"{arm}/{link.parent}", f"{arm}/{link.child}") for link in LINK_JOINTS]
+    return names

@@ -21,7 +21,7 @@ from dnet.recorders.step_text import describe_latency, describe_step
 from dnet.servo.grasping import Motion
 from dnet.sim.urdf import psm_urdf
 from dnet.trials.request import LATENCY, RECORDING, RUN
-from dnet.types import ARMS, EpisodeMeta, Goal, JointPath, Joints, Step, Trace
+from dnet.types import ARMS, EpisodeMeta, Goal, Joints, Plan, Step, Trace
 
 PICTURES = 10
 """Of the moving arm in a Rerun recording, a second of simulation."""
@@ -120,8 +120,10 @@ class TrialLog:
         for one in motions:
             plan = one.plan
             why = f" ({plan.reason})" if plan.reason else ""
+            if self._recording is not None:
+                self._recording.log_pose(one.joints, time=one.time)
+            self._log_way(one.time, plan)
             self.note(f"{one.what}: plan {plan.status}{why}", time=one.time)
-            self._along(one.time + plan.times, one.joints[0], plan.path)
 
     def note(self, text: str, *, time: float) -> None:
         """Write a line for people, at `time`."""
@@ -146,12 +148,9 @@ class TrialLog:
             return
         tips = None
         if step.plan is not None:
-            shown = step.plan.path[_rows(step.plan.times, TIPS)]
-            tips = np.array([self._arms.tip(joints) for joints in shown])
+            self._log_way(step.frame.time, step.plan)
+            tips = self._arms.tips(step.plan.path[_rows(step.plan.times, TIPS)])
         self._recording.log_step(index, step, tips)
-        if step.plan is not None:
-            times = step.frame.time + step.plan.times
-            self._along(times, step.frame.joints[0], step.plan.path)
 
     def timed(self, index: int, step: Step) -> None:
         """Write how long a step took, and say all of it."""
@@ -175,13 +174,10 @@ class TrialLog:
             {"outcome": trace.outcome, "reason": trace.reason, "chamfer": chamfers, **result}
         )
 
-    def _along(self, times: Times, holding: Joints, path: JointPath) -> None:
-        if self._recording is None:
-            return
-        # The links of each position take a millisecond: as many as the eye needs will do.
-        rows = _rows(times, PICTURES)
-        still = np.tile(holding, (len(rows), 1))
-        self._recording.arms_along(times[rows], (still, path[rows]))
+    def _log_way(self, start: float, plan: Plan) -> None:
+        if self._recording is not None:
+            rows = _rows(plan.times, PICTURES)
+            self._recording.log_way(start + plan.times[rows], plan.path[rows])
 
     def _check(self) -> None:
         free = self._free(self._out)

@@ -26,6 +26,16 @@ def rows(path: Path, entity: str, component: str, *, timeline: str | None) -> li
     return found if timeline is None else sorted(found, key=lambda row: row[0])
 
 
+def link_rows(
+    path: Path, link: str, component: str, *, timeline: str, place: str = ""
+) -> list[tuple[Any, Any]]:
+    """Return times and values of a component of one link of an arm, in time order."""
+    entity = f"{place}/tf"
+    named = rows(path, entity, "Transform3D:child_frame", timeline=timeline)
+    values = rows(path, entity, component, timeline=timeline)
+    return [value for (_, (child,)), value in zip(named, values, strict=True) if child == link]
+
+
 def entities(path: Path) -> set[str]:
     """Return the paths of all entities."""
     return {str(chunk.entity_path) for chunk in RrdReader(path).stream().to_chunks()}

@@ -13,7 +13,7 @@ from dnet.recorders.viewer_process import RERUN
 from dnet.sim.urdf import psm_urdf
 from dnet.types import Goal, Latency
 from tests.recorders.rollout import ARMS, GRASP, frames, step
-from tests.recorders.rrd import entities, rows
+from tests.recorders.rrd import entities, link_rows, rows
 
 TIPS = np.linspace(GRASP, GRASP + 0.01, 5)
 
@@ -29,8 +29,8 @@ def write(path: Path) -> Path:
         run.log_goal(seen[-1].cloud)
         run.log_step(0, step(seen[0], seen[-1]), TIPS)
         times = np.linspace(0.1, 0.9, 9)
-        paths = tuple(np.tile(joints, (9, 1)) for joints in seen[0].joints)
-        run.arms_along(times, (paths[0], paths[1]))
+        run.log_pose(seen[0].joints, time=0.1)
+        run.log_way(times, np.linspace(seen[0].joints[1], seen[2].joints[1], 9))
         run.log_frame(seen[1])
         run.log_step(1, step(seen[-1], seen[-1], planned=False), None)
         run.log_text("converged")
@@ -98,7 +98,8 @@ def test_a_run_of_which_all_is_known_shows_how_far_it_is_and_how_long_it_took(
     latencies = rows(path, "/latency", "Scalars:scalars", timeline="step")
     assert latencies == [(0.0, [1, 2, 3, 4, 5]), (1.0, [1, 2, 3, 4, 5])]
     assert [time for time, _ in rows(path, "/log", "TextLog:text", timeline="sim_time")][1] == 0.2
-    assert rows(path, "/chamfer/floor", "Scalars:scalars", timeline="sim_time")
+    curves = [values for _, values in rows(path, "/chamfer", "Scalars:scalars", timeline="step")]
+    np.testing.assert_allclose(curves, [[1e3 * step(seen[0], end).chamfer, 0.0], [0.0, 0.0]])
 
 
 def test_the_motion_is_an_arrow_from_the_grasp(recording: Path) -> None:
@@ -125,22 +126,30 @@ def test_both_arms_are_drawn_and_their_frames_hang_together(recording: Path) -> 
         named |= {
             name for _, (name,) in rows(recording, entity, "CoordinateFrame:frame", timeline=None)
         }
-    moved = {entity.removeprefix("/tf/") for entity in entities(recording) if "/tf/" in entity}
+    children = rows(recording, "/tf", "Transform3D:child_frame", timeline="step")
     assert named
-    assert named <= moved
+    assert named <= {child for _, (child,) in children}
 
 
-def test_transforms_follow_the_arms_between_the_steps(recording: Path) -> None:
-    found = rows(
-        recording, "/tf/psm_right/yaw_link", "Transform3D:translation", timeline="sim_time"
+def test_transforms_follow_the_moving_arm_between_the_steps(recording: Path) -> None:
+    seen = frames(2)
+    component = "Transform3D:translation"
+    moved, held = (
+        link_rows(recording, f"{arm}/insertion_link", component, timeline="sim_time")
+        for arm in ("psm_right", "psm_left")
     )
-    times = [time for time, _ in found]
-    assert len(times) == 12
-    np.testing.assert_allclose(
-        sorted({*np.linspace(0.1, 0.9, 9), 0.0, 0.5, 1.0}), sorted(set(times))
-    )
-    on_steps = rows(recording, "/tf/psm_right/yaw_link", "Transform3D:translation", timeline="step")
-    assert len(on_steps) == 2
+    # The way begins where the arms were shown before it.
+    times = [0.0, 0.1, *np.linspace(0.1, 0.9, 9), 0.5, 1.0]
+    np.testing.assert_allclose([time for time, _ in moved], sorted(times))
+    assert [time for time, _ in held] == [0.0, 0.1, 0.5, 1.0]
+    path = np.linspace(seen[0].joints[1], seen[2].joints[1], 9)
+    for time, joints in zip(np.linspace(0.1, 0.9, 9), path, strict=True):
+        links = ARMS.transforms((seen[0].joints[0], joints))
+        (told,) = [link for link in links if link.child == "psm_right/insertion_link"]
+        drawn = [place for when, (place,) in moved if abs(when - time) < 1e-6]
+        assert any(np.allclose(place, told.translation, atol=1e-6) for place in drawn)
+    on_steps = link_rows(recording, "psm_right/yaw_link", component, timeline="step")
+    assert [index for index, _ in on_steps] == [0, 1]
 
 
 def test_joints_are_curves_with_names(recording: Path) -> None:
