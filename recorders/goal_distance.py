@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float64, UInt8
@@ -39,6 +39,11 @@ class GoalDistance:
     def __init__(self, goal: Goal) -> None:
         self._goal = goal
         self._distance = ChamferTo(goal.cloud)
+        self.floor: Mapping[str, float] = (
+            {} if goal.again is None else _figures(self._distance.gaps(goal.again))
+        )
+        """The least that each curve can be expected to come to, where that is known."""
+        _table()  # Made before the first frame, whose latency counts.
 
     def __call__(self, frame: Frame, gaps: Gaps | None = None) -> Distances:
         """Return how far a frame with a cloud of one point or more is from the goal.
@@ -55,12 +60,6 @@ class GoalDistance:
             figures["nodes"] = 1e3 * nodes
         motion = None if goal.grasp is None else goal.grasp - frame.grasp
         return Distances(colors_of(gaps.there), figures, motion)
-
-    @cached_property
-    def floor(self) -> Mapping[str, float]:
-        """The least that each curve can be expected to come to, where that is known."""
-        again = self._goal.again
-        return {} if again is None else _figures(self._distance.gaps(again))
 
 
 def _figures(gaps: Gaps) -> dict[str, float]:
