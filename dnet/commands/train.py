@@ -1,7 +1,7 @@
 """`dnet train`: learn from recorded episodes how far the grasp must move."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -82,17 +82,20 @@ class Train:
     """Points of each cloud to take, the farthest from each other; all, unless given."""
     schedule: Literal["cosine", "step"] = "cosine"
     """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
-    learning_rate: float = 2e-3
-    """Of Adam, at its highest (paper: 0.001)."""
-    groups: int = 2
-    """Groups in a batch, over all processes, each of another episode as a rule."""
-    frames: int = 8
-    """Clouds in a group; 2 groups of 8 are 16 encodings and 112 pairs."""
-    rest_share: float = 0.25
+    learning_rate: float | None = None
+    """Of Adam, at its highest (paper: 0.001); 0.002 unless given, 0.003 for `keypoints`."""
+    groups: int | None = None
+    """Groups in a batch, over all processes, each of another episode as a rule; 2 unless given, 3
+    for `keypoints`."""
+    frames: int | None = None
+    """Clouds in a group; 8 unless given, 4 for `keypoints`. 2 groups of 8 are 16 encodings and 112
+    pairs."""
+    rest_share: float | None = None
     """Share of the groups that the rest shape joins: it is one frame of very many, and where
-    every servo run begins."""
+    every servo run begins. 0.25 unless given, 0.5 for `keypoints`."""
     augment: bool = True
-    """Turn and shift each group of frames about the table at random."""
+    """Turn and shift each group of frames about the table at random. Those of `keypoints` always
+    stay where they are: what judges them is how clouds differ, and their encoder knows of turns."""
     validation: float = 0.15
     """Share of the episodes to hold out, at least one, and of the shapes of the others."""
     seed: int = 0
@@ -165,7 +168,7 @@ class Train:
             ("--workers", self.workers, 0),
             ("--learning-rate", self.learning_rate, 1e-9),
         ):
-            if value < least:
+            if value is not None and value < least:
                 raise TooFew(what, value, least)
         if self.model != "deformernet" and self.pairs != "all":
             raise UnusedOption(f"--pairs {self.pairs}", "--model deformernet")
@@ -189,22 +192,26 @@ class Train:
     def _settings(self, device: "torch.device") -> "TrainingSettings":
         import torch
 
-        from dnet.training.augment import Augmentation
-        from dnet.training.settings import TrainingSettings
+        from dnet.training.tasks import TASKS
 
         gains = device.type == "cuda" and torch.cuda.is_bf16_supported()
         auto: Literal["float32", "bfloat16"] = "bfloat16" if gains else "float32"
-        return TrainingSettings(
+        usual = TASKS[self.model].settings
+        asked = {
+            "learning_rate": self.learning_rate,
+            "groups": self.groups,
+            "frames": self.frames,
+            "rest_share": self.rest_share,
+        }
+        return replace(
+            usual,
             epochs=self.epochs,
-            learning_rate=self.learning_rate,
             schedule=self.schedule,
             seed=self.seed,
             pairs=self.pairs,
-            groups=self.groups,
-            frames=self.frames,
-            rest_share=self.rest_share,
-            augmentation=Augmentation() if self.augment else None,
+            augmentation=usual.augmentation if self.augment else None,
             precision=auto if self.precision == "auto" else self.precision,
+            **{name: value for name, value in asked.items() if value is not None},
         )
 
     def _device(self, process: "Process") -> "torch.device":
@@ -291,6 +298,7 @@ class Train:
         begun = self._begun_with()
         if begun is not None:
             begin_with(model, begun)
+        task.fit(model, frames)
         objective = task.objective(model.to(device))
         seconds = math.inf if self.minutes is None else 60 * self.minutes
         return Training(objective, stream, settings, process=process, seconds=seconds)

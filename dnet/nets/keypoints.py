@@ -36,6 +36,8 @@ FITTED = 1024
 
 KEYPOINTS = 200
 """Keypoints of an object, as in the paper."""
+STILL = 1e-3
+"""Standard deviation up to which a channel of the encoder is not scaled."""
 FIELDS, WIDTH = 96, 96
 """Smooth fields over the object that a displacement is made of, and channels of the layers that
 make them; those that weigh them are twice as wide."""
@@ -118,6 +120,10 @@ class KeypointNet(nn.Module):
         self.config = config or DeformerNetConfig()
         self.count = min(count, self.config.points)
         self.encoder = Encoder(self.config.norm, density=self.config.density).requires_grad_(False)
+        self.middle: Tensor
+        self.spread: Tensor
+        self.register_buffer("middle", torch.zeros(Encoder.features))
+        self.register_buffer("spread", torch.ones(Encoder.features))
         self.carrier = Carrier(FIELDS, WIDTH)
 
     def train(self, mode: bool = True) -> "KeypointNet":
@@ -128,9 +134,29 @@ class KeypointNet(nn.Module):
 
     @torch.no_grad()
     def encode(self, clouds: Neighbourhoods) -> Float[Tensor, "b 256"]:
-        """Return the features of each cloud of a batch, from `prepare`."""
+        """Return the scaled features of each cloud of a batch, from `prepare`."""
         features: Tensor = self.encoder(clouds)
-        return features
+        return (features - self.middle) / self.spread
+
+    @property
+    def scaled(self) -> bool:
+        """Whether features have been scaled."""
+        return bool((self.spread != 1).any() or (self.middle != 0).any())
+
+    @torch.no_grad()
+    def scale(self, features: Float[Tensor, "n 256"]) -> None:
+        """Give features like these mean 0 and variance 1 from now on, channel by channel.
+
+        The encoder was trained with a head of its own, to which it did not matter that some
+        channels vary a hundred times as much as others.
+
+        Args:
+            features: Of clouds to train on, as `encode` returns them, two or more.
+        """
+        spread = features.std(dim=0, correction=0)
+        self.middle += features.mean(dim=0) * self.spread
+        # A channel that hardly ever fires would drown the others where it does.
+        self.spread *= torch.where(spread > STILL, spread, torch.ones_like(spread))
 
     def displacements(
         self,

@@ -24,7 +24,7 @@ _SMOOTH = 1e-4
 class KeypointLossWeights:
     """How much each term counts, beside a Chamfer distance of weight 1."""
 
-    isometry: float = 0.02
+    isometry: float = 0.005
     """Of the mean squared relative stretch between neighbours."""
     back: float = 0.1
     """Of the mean distance between where a point came from and where the way back takes it."""

@@ -1,7 +1,7 @@
 """What can be trained: each network with its loss, its targets and its judge."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 
 import torch
@@ -9,7 +9,8 @@ import torch
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
-from dnet.training.frames import Target
+from dnet.training.feature_scale import scale_features
+from dnet.training.frames import Frames, Target
 from dnet.training.objectives import (
     CarryingError,
     HeatMap,
@@ -20,11 +21,16 @@ from dnet.training.objectives import (
 )
 from dnet.training.point_scores import point_errors
 from dnet.training.scores import Errors, errors_of
+from dnet.training.settings import TrainingSettings
 
 Model = Literal["deformernet", "grasp", "dense", "keypoints"]
 """`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
 `dense`: where to grasp, as a score for each point; `keypoints`: which point is which, from clouds
 alone."""
+
+
+def _nothing(network: Network, frames: Frames) -> None:
+    del network, frames
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,11 @@ class Task:
     """What the network does, for its card."""
     zero: str
     """What predicting zero stands for."""
+    settings: TrainingSettings = field(default_factory=TrainingSettings)
+    """What it is trained with unless told otherwise."""
+    fit: Callable[[Any, Frames], None] = _nothing
+    """Fits a network that is to be trained, its weights to begin with in place, to the frames
+    that it is to learn from; the same frames, the same network."""
 
     def new(self, config: DeformerNetConfig, *, seed: int) -> Network:
         """Return an untrained network whose first weights are a function of `seed`."""
@@ -86,6 +97,10 @@ TASKS: dict[Model, Task] = {
         "Its carrier learns from clouds alone. The errors are those of carrying the manipulation "
         "point, of which it is told nothing; an encoder that was a DeformerNet's has seen motions.",
         "no motion",
+        # Many small batches from where its encoder has been, half of them with the rest shape,
+        # from which every choice of a grasp begins.
+        TrainingSettings(learning_rate=3e-3, groups=3, frames=4, rest_share=0.5, augmentation=None),
+        scale_features,
     ),
 }
 
