@@ -15,6 +15,10 @@ from dnet.servo.reach import reachable
 from dnet.sim.scenes import Workspace
 from dnet.types import Cloud, Point
 
+MOST, POWER = 100, 6
+"""Chosen on episodes that networks had learned from; of keypoints, which learn from clouds alone,
+those tell as much about manipulation points as others."""
+
 FindKeypoints = Callable[[Cloud, Cloud], Keypoints]
 """From an initial and a goal cloud to keypoints in both."""
 
@@ -38,12 +42,19 @@ class KeypointChoice:
 
 @dataclass(frozen=True)
 class DisplacementHeuristic:
-    """Grasps the mean of the most displaced keypoints, each weighing what it is displaced by."""
+    """Grasps the mean of the most displaced keypoints, each weighing what it is displaced by.
+
+    In the paper that is 20 keypoints, each weighed by its displacement. Displacements that a
+    network finds have errors, which make the greatest of them a poor guide: here more keypoints
+    count, weighed by a power, so that those that move about as far as the farthest decide.
+    """
 
     find: FindKeypoints
     """Finds keypoints, as `KeypointNet.keypoints` does."""
-    most: int = 20
-    """How many keypoints count, of those that the gripper can reach: as in the paper."""
+    most: int = MOST
+    """How many keypoints count, of those that the gripper can reach (paper: 20)."""
+    power: int | float = POWER
+    """Of the displacement: what a keypoint weighs (paper: 1)."""
     least: float = 0.003
     """Displacement of the most displaced keypoint below which the goal is reached already, in
     metres."""
@@ -86,7 +97,7 @@ class DisplacementHeuristic:
         farthest = float(displacement[counted].max())
         if farthest < self.least:
             raise NoDisplacement("the most displaced keypoint is", farthest, self.least)
-        weights = top_weights(np.where(counted, displacement, 0.0), self.most)
+        weights = top_weights(np.where(counted, displacement, 0.0), self.most, power=self.power)
         away = np.linalg.norm(surface - weights @ keypoints.initial, axis=1)
         point = surface[away.argmin()].astype(np.float64)
         before = max(chamfer(initial, goal), float(np.finfo(np.float32).tiny))
@@ -94,10 +105,19 @@ class DisplacementHeuristic:
         return KeypointChoice(point, keypoints, displacement, weights, confidence)
 
 
-def top_weights(displacement: Float32[np.ndarray, "k"], most: int) -> Float32[np.ndarray, "k"]:
-    """Return the displacements of the `most` greatest, scaled to sum to 1, and 0 for the others."""
+def top_weights(
+    displacement: Float32[np.ndarray, "k"], most: int, *, power: int | float = 1
+) -> Float32[np.ndarray, "k"]:
+    """Return a power of the `most` greatest displacements, 0 for the others; they sum to 1.
+
+    Args:
+        displacement: Of which one at least is not 0.
+        most: How many count.
+        power: To which they are raised.
+    """
     weights = np.zeros_like(displacement)
     # Stable: of keypoints equally displaced the first ones count.
     top = np.argsort(-displacement, kind="stable")[:most]
-    weights[top] = displacement[top]
+    # Shares of the greatest, whose powers are no smaller than float32 can tell from one another.
+    weights[top] = (displacement[top] / displacement.max()) ** power
     return weights / weights.sum()

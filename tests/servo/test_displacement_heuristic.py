@@ -36,9 +36,9 @@ def unmoved(initial: Cloud, goal: Cloud) -> Keypoints:
     return Keypoints(initial[:200], initial[:200], 0.0)
 
 
-@pytest.mark.parametrize("most", [3, 10, 20])
-def test_the_point_that_was_pulled_is_found(most: int) -> None:
-    found = DisplacementHeuristic(true_keypoints, most).choose(slab(), bumped(slab()))
+@pytest.mark.parametrize(("most", "power"), [(3, 1), (10, 1), (20, 1), (20, 6), (200, 6)])
+def test_the_point_that_was_pulled_is_found(most: int, power: int) -> None:
+    found = DisplacementHeuristic(true_keypoints, most, power).choose(slab(), bumped(slab()))
     assert np.linalg.norm(found.point - CENTRE) < 0.005
     assert found.confidence == 1.0
 
@@ -86,16 +86,17 @@ def test_confidence_is_the_share_of_the_difference_that_is_explained() -> None:
 @given(
     lengths=st.lists(st.floats(2**-10, 1.0, width=32), min_size=3, max_size=30),
     most=st.integers(1, 40),
+    power=st.sampled_from([1, 2, 6]),
 )
-def test_weights_are_the_greatest_displacements_in_proportion(
-    lengths: list[float], most: int
+def test_weights_are_powers_of_the_greatest_displacements_in_proportion(
+    lengths: list[float], most: int, power: int
 ) -> None:
     displacement = np.array(lengths, np.float32)
-    weights = top_weights(displacement, most)
+    weights = top_weights(displacement, most, power=power)
     assert weights.sum() == pytest.approx(1.0, abs=1e-5)
     counted = np.flatnonzero(weights)
     assert len(counted) == min(most, len(lengths))
     others = np.setdiff1d(np.arange(len(lengths)), counted)
     assert displacement[others].max(initial=0) <= displacement[counted].min()
-    ratio = weights[counted] / displacement[counted]
+    ratio = weights[counted] / (displacement[counted] / displacement.max()) ** power
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-4)
