@@ -197,7 +197,7 @@ class Train:
         gains = device.type == "cuda" and torch.cuda.is_bf16_supported()
         auto: Literal["float32", "bfloat16"] = "bfloat16" if gains else "float32"
         usual = TASKS[self.model].settings
-        asked = {
+        asked: dict[str, Any] = {
             "learning_rate": self.learning_rate,
             "groups": self.groups,
             "frames": self.frames,

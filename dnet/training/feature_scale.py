@@ -1,5 +1,6 @@
 """Fits a keypoint network to the frames that it is to learn from, before it learns."""
 
+import numpy as np
 import torch
 
 from dnet.nets.keypoints import KeypointNet
@@ -22,11 +23,8 @@ def scale_features(network: KeypointNet, frames: Frames) -> None:
     """
     if network.scaled:
         return
-    taken = Frames.of(
-        thinned(frames.table, CLOUDS), frames.config, samplings=frames.tables.samplings
-    )
-    rows = torch.arange(len(taken.table)).split(_AT_ONCE)
-    device = network.middle.device
-    network.scale(
-        torch.cat([network.encode(taken.prepared(some.numpy()).to(device)) for some in rows])
-    )
+    samplings, device = frames.tables.samplings, network.middle.device
+    taken = Frames.of(thinned(frames.table, CLOUDS), frames.config, samplings=samplings)
+    rows = np.arange(len(taken.table))
+    batches = np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))
+    network.scale(torch.cat([network.encode(taken.prepared(some).to(device)) for some in batches]))
