@@ -172,8 +172,9 @@ class Network:
                 task = bar.add_task(f"judging, {name}", total=len(table))
                 errors[name] = judged_by.judge(model, frames, on_clouds=partial(bar.advance, task))
         if self.json:
-            told = {name: found and asdict(found) for name, found in errors.items()}
-            print(dumps(told[name] if self.validation is None else told, indent=2))
+            told = {part: found and asdict(found) for part, found in errors.items()}
+            (alone, *others) = told.values()
+            print(dumps(told if others else alone, indent=2))
         else:
             Console().print(error_table(errors, title="errors", zero=judged_by.zero))
 
