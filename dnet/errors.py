@@ -576,11 +576,11 @@ class UnusedOption(DnetError, ValueError):
 
 
 class BadTables(DnetError, RuntimeError):
-    """Neighbour tables that went missing or are damaged while a training reads them."""
+    """Tables of clouds that went missing or are damaged while a training reads them."""
 
     def __init__(self, folder: Path, why: str) -> None:
         super().__init__(
-            f"the neighbour tables in {folder}: {why}; remove that folder, it can be found anew, "
+            f"the tables of clouds in {folder}: {why}; remove that folder, it can be found anew, "
             "and run the same command again"
         )
 

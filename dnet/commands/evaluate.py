@@ -167,7 +167,7 @@ class Network:
         with progress(console, "clouds") as bar:
             for name, table in parts.items():
                 frames = Frames.of(table, model.config)
-                task = bar.add_task(f"finding neighbours, {name}", total=len(table))
+                task = bar.add_task(f"describing, {name}", total=len(table))
                 frames.tables.build(on_clouds=partial(bar.advance, task))
                 task = bar.add_task(f"judging, {name}", total=len(table))
                 errors[name] = judged_by.judge(model, frames, on_clouds=partial(bar.advance, task))

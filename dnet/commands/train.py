@@ -12,9 +12,8 @@ if TYPE_CHECKING:
     import torch
     from rich.console import Console
 
-    from dnet.nets.deformernet import DeformerNetConfig
     from dnet.training.division import Division
-    from dnet.training.frames import Frames
+    from dnet.training.frames import Config, Frames
     from dnet.training.parallel import Process
     from dnet.training.run import RunWriter
     from dnet.training.settings import TrainingSettings
@@ -47,17 +46,18 @@ class Train:
     """Episodes of `dnet record`, two or more; read from where they lie, be it an object store."""
     out: Path
     """Directory for the run; made if need be, must hold none yet, unless --resume is given."""
-    model: Literal["deformernet", "grasp", "dense", "keypoints"] = "deformernet"
-    """`deformernet`: the motion from one cloud to another; `grasp`: where to grasp, as a position;
-    `dense`: where to grasp, as a score for each point; `keypoints`: which point is which, from
-    clouds alone."""
+    model: Literal["deformernet", "hu", "grasp", "dense", "keypoints"] = "deformernet"
+    """`deformernet`: the motion from one cloud to another; `hu`: the same from features made by
+    hand, after Hu et al. 2019, to compare with; `grasp`: where to grasp, as a position; `dense`:
+    where to grasp, as a score for each point; `keypoints`: which point is which, from clouds
+    alone."""
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Go on with the training in --out, exactly where it was put down; begin it if there is
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
     weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped|random")] = None
     """What to begin with: a run, a .safetensors file, the DeformerNet that `shipped`, or `random`
-    weights. A DeformerNet begins with random ones, unless given, the others with what a
+    weights. A DeformerNet and `hu` begin with random ones, unless given, the others with what a
     DeformerNet knows: `dense` with all of it, `grasp` and `keypoints` with its encoder. Options
     of the network must be those that it has."""
     epochs: int | float = 100
@@ -78,15 +78,18 @@ class Train:
     the object; or in metres, as in the paper."""
     density: bool = True
     """Weigh features by how crowded their points are."""
+    relu: bool = True
+    """Of `hu`: a ReLU after each layer but the last; without, it is a linear map."""
     points: int | None = None
     """Points of each cloud to take, the farthest from each other; all, unless given."""
     schedule: Literal["cosine", "step"] = "cosine"
     """Of the learning rate: `cosine` to zero, or a `step` of 1/10 every 50 epochs (paper)."""
     learning_rate: float | None = None
-    """Of Adam, at its highest (paper: 0.001); 0.002 unless given, 0.003 for `keypoints`."""
+    """Of Adam, at its highest (paper: 0.001); 0.002 unless given, 0.003 for `keypoints`, 0.01 for
+    `hu`."""
     groups: int | None = None
     """Groups in a batch, over all processes, each of another episode as a rule; 2 unless given, 3
-    for `keypoints`."""
+    for `keypoints`, 4 for `hu`."""
     frames: int | None = None
     """Clouds in a group; 8 unless given, 4 for `keypoints`. 2 groups of 8 are 16 encodings and 112
     pairs."""
@@ -94,10 +97,16 @@ class Train:
     """Share of the groups that the rest shape joins: it is one frame of very many, and where
     every servo run begins. 0.25 unless given, 0.5 for `keypoints`."""
     augment: bool = True
-    """Turn and shift each group of frames about the table at random. Those of `keypoints` always
-    stay where they are: what judges them is how clouds differ, and their encoder knows of turns."""
+    """Turn and shift each group of frames about the table at random. Those of `keypoints` and `hu`
+    always stay where they are: what judges keypoints is how clouds differ, and their encoder knows
+    of turns; the features of `hu` are blind to turns."""
     validation: float = 0.15
     """Share of the episodes to hold out, at least one, and of the shapes of the others."""
+    episodes: int | None = None
+    """Learn from so many episodes alone, the first ones by id, such as 1 for the shapes of one
+    object and one grasp; what is held out of the others stays the same."""
+    choose_by: Literal["unseen-episodes", "unseen-shapes"] = "unseen-episodes"
+    """Keep the network that is best on these; of a training on few episodes, unseen shapes."""
     seed: int = 0
     """Of the division, the first weights, the order and the augmentation."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
@@ -136,17 +145,20 @@ class Train:
         from dnet.commands.training_screen import show_data
         from dnet.datasets.stores import as_place
         from dnet.training.division import divide
-        from dnet.training.run import RunWriter
+        from dnet.training.run import ChosenBy, RunWriter
         from dnet.training.tasks import TASKS
 
         if not process.first:
             process.wait()  # for the index and the tables that the first one makes
         index = read_index(as_place(self.from_mcap), console)
-        division = divide(index, fraction=self.validation, seed=self.seed)
+        division = divide(index, fraction=self.validation, seed=self.seed, episodes=self.episodes)
         config = self._network(division.training.points)
         settings = self._settings(device)
         content = self._describe(division, config, settings)
-        run = RunWriter(self.out, content, resume=self.resume)
+        chosen_by: ChosenBy = (
+            "unseen_shapes" if self.choose_by == "unseen-shapes" else "unseen_episodes"
+        )
+        run = RunWriter(self.out, content, resume=self.resume, chosen_by=chosen_by)
         frames = _prepared(division, config, console)
         if process.first:
             process.wait()
@@ -167,20 +179,29 @@ class Train:
             ("--seed", self.seed, 0),
             ("--workers", self.workers, 0),
             ("--learning-rate", self.learning_rate, 1e-9),
+            ("--episodes", self.episodes, 1),
         ):
             if value is not None and value < least:
                 raise TooFew(what, value, least)
-        if self.model != "deformernet" and self.pairs != "all":
-            raise UnusedOption(f"--pairs {self.pairs}", "--model deformernet")
+        if self.model not in ("deformernet", "hu") and self.pairs != "all":
+            raise UnusedOption(f"--pairs {self.pairs}", "--model deformernet or hu")
+        if self.model != "hu" and not self.relu:
+            raise UnusedOption("--no-relu", "--model hu")
+        usual = ("light", "group", "scaled", True)
+        if self.model == "hu" and (self.size, self.norm, self.coordinates, self.density) != usual:
+            raise UnusedOption("--size, --norm, --coordinates or --no-density", "another --model")
         if self.minutes is not None and not self.minutes > 0:
             raise TooShort("--minutes", self.minutes)
 
-    def _network(self, points: int) -> "DeformerNetConfig":
+    def _network(self, points: int) -> "Config":
         from dnet.errors import ShortCloud
         from dnet.nets.deformernet import DeformerNetConfig
+        from dnet.nets.hu import HuNetConfig
 
         if self.points is not None and self.points > points:
             raise ShortCloud(points, self.points)
+        if self.model == "hu":
+            return HuNetConfig(points=self.points or points, relu=self.relu)
         return DeformerNetConfig(
             size=self.size,
             norm=self.norm,
@@ -227,7 +248,7 @@ class Train:
         return torch.device("cpu")
 
     def _describe(
-        self, division: "Division", config: "DeformerNetConfig", settings: "TrainingSettings"
+        self, division: "Division", config: "Config", settings: "TrainingSettings"
     ) -> dict[str, Any]:
         """Return what shaped the run, as config.json holds it."""
         parts = {
@@ -235,7 +256,13 @@ class Train:
             "unseen_shapes": division.unseen_shapes,
             "unseen_episodes": division.unseen_episodes,
         }
-        begun = {"minutes": self.minutes, "weights": self._digest()}
+        begun = {
+            "minutes": self.minutes,
+            "weights": self._digest(),
+            "episodes": self.episodes,
+            # Runs from before there was a choice can be gone on with.
+            "choose_by": None if self.choose_by == "unseen-episodes" else self.choose_by,
+        }
         return {
             "network": {"model": self.model} | asdict(config),
             "training": asdict(settings) | begun,
@@ -255,7 +282,7 @@ class Train:
         from dnet.training.checkpoints import weights_file
         from dnet.weights import DEFORMERNET
 
-        usual = "random" if self.model == "deformernet" else "shipped"
+        usual = "random" if self.model in ("deformernet", "hu") else "shipped"
         match self.weights or usual:
             case "random":
                 return None
@@ -274,7 +301,7 @@ class Train:
     def _begin(
         self,
         frames: "Frames",
-        config: "DeformerNetConfig",
+        config: "Config",
         settings: "TrainingSettings",
         *,
         device: "torch.device",
@@ -335,15 +362,15 @@ class Train:
             )
 
 
-def _prepared(division: "Division", config: "DeformerNetConfig", console: "Console") -> "Frames":
+def _prepared(division: "Division", config: "Config", console: "Console") -> "Frames":
     """Return the frames to learn from; find the tables of all frames, with a progress bar."""
     from dnet.commands.progress import progress
     from dnet.training.frames import Frames
-    from dnet.training.neighbour_tables import NeighbourTables, samplings_for
+    from dnet.training.neighbour_tables import samplings_for
 
     samplings = samplings_for(len(division.training))
     with progress(console, "clouds") as bar:
-        task = bar.add_task("finding neighbours", total=len(division.all))
-        tables = NeighbourTables(division.all, config, samplings)
+        task = bar.add_task("describing", total=len(division.all))
+        tables = Frames.of(division.all, config, samplings=samplings).tables
         tables.build(on_clouds=lambda done: bar.advance(task, done))
     return Frames.of(division.training, config, samplings=samplings)

@@ -78,9 +78,7 @@ def _stopped_line(training: "Training", run: "RunWriter") -> str:
 
 
 def _best_line(run: "RunWriter") -> str:
-    from dnet.training.run import best_of
-
-    best = best_of(run.history)
+    best = run.best
     if best is None:
         return ""
     return f"the best was epoch {best['epoch']}; "

@@ -229,15 +229,27 @@ def prepare(
         LongCloud: If it has more.
         BadCloud: If a coordinate is NaN or infinite.
     """
-    if len(cloud) < config.points:
-        raise ShortCloud(len(cloud), config.points)
-    if len(cloud) > config.points:
-        raise LongCloud(what, len(cloud), config.points)
+    cloud = checked(cloud, config.points, what=what)
+    (points,) = in_unit(cloud[None], config, centres=None if centre is None else centre[None])
+    return find_neighbourhoods(points, GROUPINGS[config.size])
+
+
+def checked(cloud: Cloud, points: int, *, what: str = "cloud") -> Cloud:
+    """Return a cloud that has exactly so many points, all of them numbers.
+
+    Raises:
+        ShortCloud: If it has fewer.
+        LongCloud: If it has more.
+        BadCloud: If a coordinate is NaN or infinite.
+    """
+    if len(cloud) < points:
+        raise ShortCloud(len(cloud), points)
+    if len(cloud) > points:
+        raise LongCloud(what, len(cloud), points)
     bad = int((~np.isfinite(cloud).all(axis=1)).sum())
     if bad:
         raise BadCloud(what, bad, len(cloud))
-    (points,) = in_unit(cloud[None], config, centres=None if centre is None else centre[None])
-    return find_neighbourhoods(points, GROUPINGS[config.size])
+    return cloud
 
 
 def prepare_seen(

@@ -62,6 +62,10 @@ class Neighbourhoods:
     ]
     """For each level: one over the density at every point that it gathers from."""
 
+    def __len__(self) -> int:
+        """Return how many clouds a batch has."""
+        return len(self.points)
+
     def to(self, device: torch.device) -> "Neighbourhoods":
         """Return the same tables on `device`."""
         return self._map(lambda table: table.to(device, non_blocking=True))

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
+from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
@@ -110,7 +111,8 @@ def load_any(path: Path) -> Network:
     name = header.get("network", "an unnamed network")
     if name not in kinds:
         raise BadCheckpoint(file, f"holds {name}, not one of {', '.join(kinds)}", _HINT)
-    network: Network = kinds[name](config_of(file, header.get("config")))
+    of = hu_config_of if name == HuNet.__name__ else config_of
+    network: Network = kinds[name](of(file, header.get("config")))
     _check_shapes(file, weights, network.state_dict())
     network.load_state_dict(weights)
     return network.eval()
@@ -130,8 +132,10 @@ def begin_with(model: Network, path: Path) -> None:
     """
     held = load_any(path)
     alike = type(held) is type(model)
-    if not (alike or isinstance(held, DeformerNet)):
-        found = f"holds {type(held).__name__}, not {type(model).__name__} or DeformerNet"
+    serves = isinstance(held, DeformerNet) and not isinstance(model, HuNet)
+    if not (alike or serves):
+        wanted = [type(model).__name__, *([] if isinstance(model, HuNet) else ["DeformerNet"])]
+        found = f"holds {type(held).__name__}, not {' or '.join(wanted)}"
         raise BadCheckpoint(path, found, _HINT)
     for name, value in asdict(model.config).items():
         # Another network may look at more points or fewer.
@@ -221,6 +225,25 @@ def config_of(file: Path, fields: Any) -> DeformerNetConfig:
             got = getattr(config, what)
             raise BadCheckpoint(file, f"is of {what} {got!r}", "install a newer dnet")
     return config
+
+
+def hu_config_of(file: Path, fields: Any) -> HuNetConfig:
+    """Return the config of a network of Hu et al. that the header of a file holds.
+
+    Raises:
+        BadCheckpoint: If it holds none.
+    """
+    try:
+        x, y, z = (float(place) for place in fields["eye"])
+        return HuNetConfig(
+            points=int(fields["points"]),
+            components=int(fields["components"]),
+            relu=bool(fields["relu"]),
+            eye=(x, y, z),
+            motion_unit=float(fields["motion_unit"]),
+        )
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise BadCheckpoint(file, f"has an unreadable config ({error!r})", _HINT) from error
 
 
 def _check_shapes(file: Path, got: Mapping[str, Tensor], want: Mapping[str, Tensor]) -> None:

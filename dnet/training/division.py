@@ -35,7 +35,7 @@ class Division:
         }
 
 
-def divide(index: Index, *, fraction: float, seed: int) -> Division:
+def divide(index: Index, *, fraction: float, seed: int, episodes: int | None = None) -> Division:
     """Return which frames of a dataset to learn from.
 
     A side depends on hashes of episode and shape alone, so that episodes recorded later leave
@@ -46,6 +46,8 @@ def divide(index: Index, *, fraction: float, seed: int) -> Division:
         fraction: How many episodes to hold out, and how many shapes of the others; at least one
             episode is held out and one learned from.
         seed: Another seed, another division.
+        episodes: How many of the episodes that are not held out to learn from, the first ones by
+            id; None for all. What is held out stays the same.
 
     Raises:
         BadEpisode: If one of the files cannot be read, clouds differ in their number of points,
@@ -61,6 +63,7 @@ def divide(index: Index, *, fraction: float, seed: int) -> Division:
     if len(ids) < 2:
         raise TooFew(f"number of episodes in {index.root} with two settled frames", len(ids), 2)
     train_ids, held_out = split(ids, fraction=fraction, seed=seed)
+    train_ids = train_ids[:episodes]
     training, unseen = split_frames(
         paired.of_episodes(set(train_ids)), fraction=fraction, seed=seed
     )

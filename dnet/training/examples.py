@@ -1,6 +1,7 @@
 """Examples to learn from: clouds to encode, which of them form pairs, and the motions between."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -13,7 +14,7 @@ from dnet.datasets.groups import Groups
 from dnet.datasets.pairs import Pairs, any_two, from_rest
 from dnet.datasets.stream import Stream
 from dnet.errors import Uneven
-from dnet.nets.neighbourhoods import Neighbourhoods
+from dnet.nets.deformernet import DeformerNetConfig
 from dnet.training.augment import Augmentation, Placement, place, turn
 from dnet.training.frames import Frames, Rows, Target
 from dnet.training.parallel import Process
@@ -24,7 +25,8 @@ from dnet.training.settings import TrainingSettings
 class Examples:
     """A batch."""
 
-    clouds: Neighbourhoods
+    clouds: Any
+    """As the network takes them: a batch of neighbourhoods, or of features."""
     current: Int64[Tensor, " p"]
     """Of each pair: which of the clouds is the current one."""
     goal: Int64[Tensor, " p"]
@@ -229,9 +231,11 @@ def _examples(
     current, goal = pairs
     motions = torch.from_numpy(frames.motions(rows[current], rows[goal]))
     points = torch.from_numpy(frames.points(rows[current]))
-    if placement is not None:
+    config = frames.config
+    # Features of a surface are blind to how it is placed: a motion that turned would be a riddle.
+    if placement is not None and isinstance(config, DeformerNetConfig):
         of_clouds, of_pairs = torch.from_numpy(groups), torch.from_numpy(groups[current])
-        unit = frames.config.coordinate_unit
+        unit = config.coordinate_unit
         clouds = place(clouds, placement, groups=of_clouds, coordinate_unit=unit)
         motions = turn(motions, placement, groups=of_pairs)
         points = turn(points, placement, groups=of_pairs) + placement.shifts[of_pairs]

@@ -1,7 +1,7 @@
 """Frames of a dataset as a network takes them: clouds from the logs, tables from beside them."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float32, Int64
@@ -9,8 +9,11 @@ from jaxtyping import Float32, Int64
 from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable
 from dnet.nets.deformernet import DeformerNetConfig
-from dnet.nets.neighbourhoods import Neighbourhoods
+from dnet.nets.hu import HuNetConfig
+from dnet.training.feature_tables import FeatureTables
 from dnet.training.neighbour_tables import NeighbourTables
+
+Config = DeformerNetConfig | HuNetConfig
 
 Rows = Int64[np.ndarray, "_"]
 """Rows of a table of frames."""
@@ -25,11 +28,13 @@ class Frames:
     """Frames that stay on disk until they are asked for. They can go to other processes."""
 
     clouds: Clouds
-    tables: NeighbourTables
+    tables: NeighbourTables | FeatureTables
 
     @classmethod
-    def of(cls, table: FrameTable, config: DeformerNetConfig, *, samplings: int = 1) -> "Frames":
+    def of(cls, table: FrameTable, config: Config, *, samplings: int = 1) -> "Frames":
         """Return the frames of a table for a network of `config`, whose tables are found."""
+        if isinstance(config, HuNetConfig):
+            return cls(Clouds(table), FeatureTables(table, config))
         return cls(Clouds(table), NeighbourTables(table, config, samplings))
 
     @property
@@ -38,12 +43,12 @@ class Frames:
         return self.clouds.table
 
     @property
-    def config(self) -> DeformerNetConfig:
+    def config(self) -> Config:
         """Of the network that they are for."""
         return self.tables.config
 
-    def prepared(self, rows: Rows, *, choices: Rows | None = None) -> Neighbourhoods:
-        """Return some frames as a batch.
+    def prepared(self, rows: Rows, *, choices: Rows | None = None) -> Any:
+        """Return some frames as a batch, as the network takes it: its neighbourhoods or features.
 
         Args:
             rows: Which.
@@ -53,6 +58,8 @@ class Frames:
             ChangedEpisode: If a file is not the one that was indexed.
             BadTables: If the tables beside the data are not there any more, or damaged.
         """
+        if isinstance(self.tables, FeatureTables):
+            return self.tables.of(rows)
         clouds = self.clouds.stack(rows)[:, : self.config.points]
         return self.tables.of(rows, clouds, choices=choices)
 

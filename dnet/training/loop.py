@@ -93,6 +93,9 @@ def _judged(
     )
     if episodes is None:
         raise TooFew("number of pairs of unseen episodes", 0, 1)
+    chosen_by = {"unseen_episodes": episodes, "unseen_shapes": shapes}[run.chosen_by]
+    if chosen_by is None:
+        raise TooFew("number of pairs of unseen shapes", 0, 1)
     done = EpochDone(
         epoch=len(run.history) + 1,
         steps=training.steps,
@@ -101,7 +104,7 @@ def _judged(
         losses=losses,
         unseen_shapes=shapes,
         unseen_episodes=episodes,
-        best=episodes.main.mse_mm2 < run.least,
+        best=chosen_by.main.mse_mm2 < run.least,
         learning_rate=training.rate,
         seconds=training.seconds,
         waited=training.waited,

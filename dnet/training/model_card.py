@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from dnet.errors import TooFew
-from dnet.training.run import RunWriter, best_of
+from dnet.training.run import RunWriter
 from dnet.training.scores import Errors, Scores
 from dnet.training.tasks import Task
 
@@ -29,7 +29,7 @@ def card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) -> str
     """Return the card as Markdown."""
     content = run.content
     network, settings, data = content["network"], content["training"], content["data"]
-    best = best_of(run.history)
+    best = run.best
     if best is None:
         raise TooFew(f"number of epochs of {run.path}", 0, 1)
     frames = data["frames"]
@@ -44,7 +44,8 @@ def card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) -> str
         f"of {len(data['unseen_episodes'])} others to be judged by; fingerprints "
         f"{', '.join(data['fingerprints'].values())}",
         f"- **Training**: {_listed(settings)}",
-        f"- **Best epoch**: {best['epoch']} of {len(run.history)}, after {best['steps']} batches "
+        f"- **Best epoch**: {best['epoch']} of {len(run.history)}, on "
+        f"{run.chosen_by.replace('_', ' ')}, after {best['steps']} batches "
         f"and {best['seconds'] / 3600:.2f} hours",
         f"- **Versions**: {_listed(content['versions'])}",
         "",

@@ -1,19 +1,20 @@
 """What each network is trained to do: from a batch to the loss of each of its pairs."""
 
 from abc import ABC, abstractmethod
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import torch
 from jaxtyping import Float, Int64
 from torch import Tensor, nn
 
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor, surface
 from dnet.nets.neighbourhoods import Neighbourhoods
 from dnet.training.keypoint_batch import KeypointObjective
 
-Network = DeformerNet | PointRegressor | DensePredictor | KeypointNet
+Network = DeformerNet | HuNet | PointRegressor | DensePredictor | KeypointNet
 """What can be trained."""
 N = TypeVar("N", bound=Network)
 
@@ -29,7 +30,7 @@ class Objective(nn.Module, ABC, Generic[N]):
     """A network and its loss, as one call: what several processes average the gradient of."""
 
     network: N
-    config: DeformerNetConfig
+    config: DeformerNetConfig | HuNetConfig
     """Of the network."""
     shown: float
     """What a loss is multiplied with to be told: squared errors in mm², distances in mm."""
@@ -37,7 +38,7 @@ class Objective(nn.Module, ABC, Generic[N]):
     @abstractmethod
     def forward(
         self,
-        clouds: Neighbourhoods,
+        clouds: Any,
         current: Tensor,
         goal: Tensor,
         motions: Tensor,
@@ -46,7 +47,7 @@ class Objective(nn.Module, ABC, Generic[N]):
         """Return the loss of each pair; near 1 for an untrained network.
 
         Args:
-            clouds: A batch.
+            clouds: A batch, as the network takes it.
             current: Of each pair: which of the clouds is the current one.
             goal: Of each pair: which is the goal.
             motions: Of each pair: the true motion of the grasp, in metres, (p, 3).
@@ -54,17 +55,17 @@ class Objective(nn.Module, ABC, Generic[N]):
         """
 
 
-class MotionError(Objective[DeformerNet]):
-    """Squared error of DeformerNet's motions, mean over x, y, z, in its unit."""
+class MotionError(Objective[DeformerNet | HuNet]):
+    """Squared error of the motions between clouds, mean over x, y, z, in the network's unit."""
 
-    def __init__(self, network: DeformerNet) -> None:
+    def __init__(self, network: DeformerNet | HuNet) -> None:
         super().__init__()
         self.network, self.config = network, network.config
         self.shown = (1000 * network.config.motion_unit) ** 2
 
     def forward(
         self,
-        clouds: Neighbourhoods,
+        clouds: Any,
         current: Tensor,
         goal: Tensor,
         motions: Tensor,
@@ -134,7 +135,7 @@ class HeatMap(Objective[DensePredictor]):
         of: Int64[Tensor, " p"],
         points: Float[Tensor, "p 3"],
     ) -> Float[Tensor, "p c"]:
-        places = candidates[of] * self.config.coordinate_unit
+        places = candidates[of] * self.network.config.coordinate_unit
         squares = (places - points[:, None]).square().sum(dim=2)
         return torch.log_softmax(-squares / (2 * LABEL_RADIUS**2), dim=1)
 

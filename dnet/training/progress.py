@@ -39,7 +39,7 @@ class EpochDone:
     """On other shapes of the episodes that are trained on; None if they make no pair."""
     unseen_episodes: Errors
     best: bool
-    """Whether no epoch before had a smaller error on unseen episodes."""
+    """Whether no epoch before had a smaller error on the frames that the network is chosen by."""
     learning_rate: float
     seconds: float
     """Of training so far, interruptions left out."""

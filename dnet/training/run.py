@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
@@ -23,6 +23,9 @@ LAST, CONFIG, METRICS, STATE, ERRORS = (
 )
 
 
+ChosenBy = Literal["unseen_episodes", "unseen_shapes"]
+"""Held-out frames that a network can be chosen by."""
+
 EXTENSIBLE = ("epochs", "minutes")
 """What a training may go on with otherwise than it began: the schedule follows the new end."""
 
@@ -36,6 +39,7 @@ class RunWriter:
         path: The run directory.
         content: What shaped the training, as JSON.
         resume: Whether to go on with the training that `path` holds, if it does.
+        chosen_by: The frames that the best network is best on.
 
     Raises:
         OccupiedOutput: If `path` holds a run and is not to be gone on with, or is a file.
@@ -43,10 +47,19 @@ class RunWriter:
         BadCheckpoint: If what it holds cannot be read.
     """
 
-    def __init__(self, path: Path, content: Mapping[str, Any], *, resume: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        content: Mapping[str, Any],
+        *,
+        resume: bool = False,
+        chosen_by: ChosenBy = "unseen_episodes",
+    ) -> None:
         self.path = path
         self.history: list[dict[str, Any]] = []
         """What was written of each epoch."""
+        self.chosen_by: ChosenBy = chosen_by
+        """The frames that the best network is best on."""
         self.content = json.loads(json.dumps(content))
         self._state: tuple[dict[str, Any], Any] | None = None
         if path.exists() and not path.is_dir():
@@ -58,10 +71,15 @@ class RunWriter:
             self._resume()
 
     @property
+    def best(self) -> Mapping[str, Any] | None:
+        """The best epoch so far, as it was written down; None before the first."""
+        return best_of(self.history, by=self.chosen_by)
+
+    @property
     def least(self) -> float:
-        """The smallest error on unseen episodes so far, in mm²."""
-        best = best_of(self.history)
-        return math.inf if best is None else main_scores(best["unseen_episodes"])["mse_mm2"]
+        """The smallest error so far on the frames that the network is chosen by, in mm²."""
+        best = self.best
+        return math.inf if best is None else main_scores(best[self.chosen_by])["mse_mm2"]
 
     def take_up(self, training: Training) -> bool:
         """Put `training` where the run was put down; return whether there was anything.
@@ -123,11 +141,11 @@ class RunWriter:
         part.replace(self.path / METRICS)
 
 
-def best_of(history: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the epoch whose network was best on unseen episodes, as it was written down."""
-    return min(
-        history, key=lambda line: main_scores(line["unseen_episodes"])["mse_mm2"], default=None
-    )
+def best_of(
+    history: Sequence[Mapping[str, Any]], *, by: ChosenBy = "unseen_episodes"
+) -> Mapping[str, Any] | None:
+    """Return the epoch whose network was best on some frames, as it was written down."""
+    return min(history, key=lambda line: main_scores(line[by])["mse_mm2"], default=None)
 
 
 def main_scores(errors: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -11,6 +11,7 @@ from torch import Tensor
 from dnet.datasets.pairs import AnyTwo
 from dnet.errors import TooFew
 from dnet.nets.deformernet import DeformerNet
+from dnet.nets.hu import HuNet
 from dnet.nets.keypoints import KeypointNet
 from dnet.training.frames import Frames, Rows
 
@@ -105,7 +106,7 @@ def score(predicted: Float[Tensor, "p 3"], true: Float[Tensor, "p 3"]) -> Scores
 
 
 def errors_of(
-    model: DeformerNet | KeypointNet,
+    model: DeformerNet | HuNet | KeypointNet,
     frames: Frames,
     *,
     watch: Watch | None = None,
@@ -152,18 +153,20 @@ def no_motion(frames: Frames) -> Scores:
     return tally.scores()
 
 
-def _encode(model: DeformerNet | KeypointNet, frames: Frames, rows: Rows) -> Float[Tensor, "n 256"]:
+def _encode(
+    model: DeformerNet | HuNet | KeypointNet, frames: Frames, rows: Rows
+) -> Float[Tensor, "n c"]:
     device = next(model.parameters()).device
     batches = np.split(rows, range(_CLOUDS, len(rows), _CLOUDS))
     return torch.cat([model.encode(frames.prepared(batch).to(device)) for batch in batches])
 
 
 def _judge(
-    model: DeformerNet | KeypointNet,
+    model: DeformerNet | HuNet | KeypointNet,
     frames: Frames,
     rows: Rows,
     *,
-    features: Float[Tensor, "n 256"],
+    features: Float[Tensor, "n c"],
     tallies: tuple[Tally, Tally],
     watch: Watch | None,
 ) -> None:
@@ -183,12 +186,12 @@ def _judge(
 
 
 def _motions(
-    model: DeformerNet | KeypointNet,
-    start: Float[Tensor, "p 256"],
-    end: Float[Tensor, "p 256"],
+    model: DeformerNet | HuNet | KeypointNet,
+    start: Float[Tensor, "p c"],
+    end: Float[Tensor, "p c"],
     grasps: Float32[np.ndarray, "p 3"],
 ) -> Float[Tensor, "p 3"]:
-    if isinstance(model, DeformerNet):
+    if isinstance(model, DeformerNet | HuNet):
         return model.motion(start, end).float().cpu()
     unit = model.config.coordinate_unit
     points = torch.from_numpy(grasps / np.float32(unit)).to(start.device)[:, None]

@@ -135,7 +135,7 @@ class Training:
         told = (
             len(losses),
             loss.item(),
-            len(batch.clouds.points),
+            len(batch.clouds),
             self.seconds,
             self._asked,
         )

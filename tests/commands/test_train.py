@@ -26,8 +26,9 @@ from dnet.errors import (
     OtherRun,
     TooFew,
     TooShort,
+    UnusedOption,
 )
-from dnet.training.checkpoints import load
+from dnet.training.checkpoints import load, load_any, read_metrics
 from dnet.training.run import read_config
 from tests.recorders import rollout
 
@@ -204,6 +205,58 @@ def test_a_training_may_begin_with_the_weights_of_another(
         replace(tune, epochs=2, learning_rate=1e-9, weights=None, resume=True).run()
 
 
+def test_the_network_of_hu_leaves_the_same_files_and_is_judged_alike(
+    run: Path, episodes: Path, tmp_path: Path
+) -> None:
+    train = Train(from_mcap=episodes, out=tmp_path / "hu", model="hu", epochs=2, device="cpu")
+    train.run()
+    assert {path.name for path in train.out.iterdir()} == {path.name for path in run.iterdir()}
+    one, other = (json.loads((path / "errors.json").read_text()) for path in (run, train.out))
+    pairs = {name: {kind: of and of["pairs"] for kind, of in one[name].items()} for name in one}
+    assert pairs == {
+        name: {kind: of and of["pairs"] for kind, of in other[name].items()} for name in other
+    }
+    assert "# HuNet" in (train.out / "MODEL_CARD.md").read_text()
+    training = read_config(train.out)["training"]
+    kept = training["augmentation"], training["learning_rate"], training["groups"]
+    assert kept == (None, 0.01, 4)
+    replace(train, out=tmp_path / "again").run()
+    best = [(tmp_path / name / "best.safetensors") for name in ("hu", "again")]
+    one, other = (load_any(path).state_dict() for path in best)
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    # What it learned goes with its components, not with those of the frames it is to learn from.
+    tuned = replace(train, out=tmp_path / "tuned", weights=str(best[0]), episodes=1)
+    replace(tuned, epochs=1, learning_rate=1e-9).run()
+    for name, weights in load_any(tuned.out).state_dict().items():
+        torch.testing.assert_close(weights, one[name])
+    replace(train, epochs=3, resume=True).run()
+    assert len(untimed(train.out)) == 3
+
+
+def test_one_episode_is_enough_and_unseen_shapes_of_it_choose(tmp_path: Path) -> None:
+    for index in range(2):
+        seen = rollout.frames(12, seed=index, points=POINTS)
+        rollout.write(tmp_path / f"episode-{index}.mcap", seen)
+    train = Train(
+        from_mcap=tmp_path,
+        out=tmp_path / "run",
+        model="hu",
+        episodes=1,
+        choose_by="unseen-shapes",
+        validation=0.4,
+        epochs=6,
+        learning_rate=0.02,
+        device="cpu",
+    )
+    train.run()
+    lines = untimed(train.out)
+    errors = [line["unseen_shapes"]["any_pair"]["mse_mm2"] for line in lines]
+    kept = read_metrics(train.out)["unseen_shapes"]["any_pair"]["mse_mm2"]
+    assert kept == min(errors)
+    assert len(read_config(train.out)["data"]["training"]) == 1
+    assert "on unseen shapes" in (train.out / "MODEL_CARD.md").read_text()
+
+
 def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError], str]]:
     good = Train(from_mcap=episodes, out=tmp_path / "run")
     empty = tmp_path / "empty"
@@ -224,6 +277,9 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),
         (replace(good, weights="nowhere"), BadCheckpoint, "nowhere does not exist"),
         (replace(good, weights="shipped"), BadCheckpoint, "with points 2048, not 136"),
+        (replace(good, episodes=0), TooFew, "--episodes is 0, must be at least 1"),
+        (replace(good, relu=False), UnusedOption, "--no-relu does nothing without --model hu"),
+        (replace(good, model="hu", norm="batch"), UnusedOption, "without another --model"),
         (replace(good, size="paper"), TooFew, "136, must be at least 512"),
     ]
 

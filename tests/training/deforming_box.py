@@ -13,7 +13,7 @@ from dnet.datasets.frame_table import settled_frames
 from dnet.datasets.index import open_index
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNetConfig
-from dnet.training.frames import Frames
+from dnet.training.frames import Config, Frames
 from dnet.types import Frame, FrameKind
 from tests.recorders import rollout
 
@@ -70,7 +70,7 @@ def box_frames(
     seeds: Sequence[int],
     *,
     samplings: int = 1,
-    config: DeformerNetConfig = SMALL,
+    config: Config = SMALL,
 ) -> Frames:
     """Write a dataset of boxes and return its frames as a network takes them."""
     boxes = [BoxEpisode(seed, points=config.points) for seed in seeds]

@@ -15,10 +15,18 @@ from safetensors.torch import save_file
 
 from dnet.errors import BadCheckpoint
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
-from dnet.training.checkpoints import begin_with, load, read_metrics, save, write_json
+from dnet.training.checkpoints import (
+    begin_with,
+    load,
+    load_any,
+    read_metrics,
+    save,
+    write_json,
+)
 from dnet.training.tasks import new_network
 from tests.training.deforming_box import SMALL, BoxEpisode
 
@@ -244,3 +252,29 @@ def test_networks_that_choose_where_to_grasp_begin_with_what_a_deformernet_knows
     )
     with pytest.raises(BadCheckpoint, match="holds DensePredictor, not PointRegressor or Deform"):
         begin_with(regressor, tmp_path / "dense.safetensors")
+
+
+def test_a_network_of_hu_keeps_its_components_and_begins_with_nothing_else(
+    saved: Path, tmp_path: Path
+) -> None:
+    network = HuNet(HuNetConfig(points=160, components=5, relu=False, eye=(0.1, -0.2, 0.3)))
+    network.fit(
+        np.random.default_rng(0).normal(size=(40, 135)).astype(np.float32), np.arange(40) // 8
+    )
+    file = tmp_path / "best.safetensors"
+    save(file, network)
+    loaded = load_any(tmp_path)
+    assert isinstance(loaded, HuNet)
+    assert loaded.config == network.config
+    assert torch.equal(loaded.basis, network.basis)
+    again = HuNet(network.config)
+    begin_with(again, file)
+    assert torch.equal(again.basis, network.basis)
+    with pytest.raises(BadCheckpoint, match="holds DeformerNet, not HuNet;"):
+        begin_with(again, saved)
+    with pytest.raises(BadCheckpoint, match="holds HuNet, not DeformerNet"):
+        load(file)
+    header = {"dnet": json.dumps({"network": "HuNet", "config": {"points": 160}})}
+    save_file(network.state_dict(), file, metadata=header)
+    with pytest.raises(BadCheckpoint, match="unreadable config"):
+        load_any(file)

@@ -53,6 +53,15 @@ def test_of_seen_episodes_every_shape_is_on_one_side_and_rest_shapes_are_on_both
     assert len(training) > len(unseen) > len(episodes(division.training))
 
 
+def test_few_episodes_may_be_learned_from_and_the_same_ones_are_held_out(directory: Path) -> None:
+    every = of(directory)
+    few = divide(open_index(directory), fraction=0.4, seed=0, episodes=1)
+    assert few.training.episodes_seen == every.training.episodes_seen[:1]
+    assert few.unseen_shapes.episodes_seen == few.training.episodes_seen
+    assert frames(few.unseen_episodes) == frames(every.unseen_episodes)
+    assert frames(few.training) <= frames(every.training)
+
+
 def test_another_seed_makes_another_division(directory: Path) -> None:
     divisions = [of(directory, seed=seed) for seed in range(12)]
     assert len({frozenset(episodes(one.unseen_episodes)) for one in divisions}) > 1

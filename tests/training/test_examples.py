@@ -11,7 +11,7 @@ from dnet.training.examples import Examples, Variation, stream_of
 from dnet.training.frames import Frames
 from dnet.training.parallel import Process
 from dnet.training.settings import PairKind, TrainingSettings
-from tests.training.deforming_box import box_frames
+from tests.training.deforming_box import SMALL, box_frames
 
 SETTINGS = TrainingSettings(groups=2, frames=3, rest_share=0.0)
 PLAIN = replace(SETTINGS, augmentation=None)
@@ -46,7 +46,7 @@ def same(one: list[Examples], other: list[Examples]) -> bool:
 def found(frames: Frames, cloud: torch.Tensor) -> int:
     """Which frame an unplaced cloud is of."""
     every = torch.from_numpy(frames.clouds.stack(np.arange(len(frames.table))))
-    distances = (every - cloud * frames.config.coordinate_unit).abs().amax(dim=(1, 2))
+    distances = (every - cloud * SMALL.coordinate_unit).abs().amax(dim=(1, 2))
     assert distances.min() < 1e-6
     return int(distances.argmin())
 

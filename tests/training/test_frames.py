@@ -61,9 +61,10 @@ def test_centred_frames_are_about_the_rest_shape_of_their_episode(tmp_path: Path
 
 def test_a_network_of_fewer_points_takes_the_first_ones(tmp_path: Path) -> None:
     whole = box_frames(tmp_path, [0])
-    few = Frames.of(whole.table, replace(SMALL, points=140))
+    fewer = replace(SMALL, points=140)
+    few = Frames.of(whole.table, fewer)
     few.tables.build()
-    want = [prepare(BoxEpisode(0).frame(index).cloud[:140], few.config) for index in (0, 3)]
+    want = [prepare(BoxEpisode(0).frame(index).cloud[:140], fewer) for index in (0, 3)]
     assert same(few.prepared(np.array([0, 3])), stack(want))
 
 

@@ -60,7 +60,7 @@ def test_points_are_learned_from_rest_to_every_other_shape_of_a_group(frames: Fr
 def test_a_placed_point_moves_with_its_object(frames: Frames) -> None:
     settings = TrainingSettings(groups=2, frames=3)
     examples = next(iter(stream_of(frames, settings, process=Process(), target="point")))
-    unit = frames.config.coordinate_unit
+    unit = SMALL.coordinate_unit
     plain = frames.table
     for pair, rest in enumerate(examples.current.tolist()):
         distances = (examples.clouds.points[rest] * unit - examples.points[pair]).norm(dim=1)

@@ -34,7 +34,7 @@ def begin(
 ) -> Training:
     stream = stream_of(frames, settings, process=Process(), workers=workers)
     return Training(
-        MotionError(new_network(frames.config, seed=settings.seed)),
+        MotionError(new_network(SMALL, seed=settings.seed)),
         stream,
         settings,
         seconds=seconds,
