@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from dnet.types import Trace
 
 
-Controller = Literal["deformernet", "oracle", "none", "rrt"]
+Controller = Literal["deformernet", "hu", "hu-online", "oracle", "none", "rrt"]
 Grasp = Literal["truth", "keypoints", "regressor", "dense", "displaced", "farthest"]
 
 
@@ -22,6 +22,8 @@ class ServoOptions:
     checkpoint: Path | None = None
     """Directory that `dnet train` wrote, one of its .safetensors files, or an .onnx of `dnet
     export`; the network that ships, unless given."""
+    hu_checkpoint: Path | None = None
+    """Network of `hu` and `hu-online`: what `dnet train --model hu` wrote; none ships."""
     grasp: Grasp = "truth"
     """What decides where the object is grasped: the point at which the goal was made; keypoints,
     where those are that move most; a network that answers with a position (`regressor`), or with
@@ -63,14 +65,14 @@ class ServoOptions:
             DnetError: If an option is out of its range, or there is no such network.
         """
         from dnet.laboratory import LaboratorySettings
-        from dnet.perception.cloud import POINTS
         from dnet.perception.noise import DepthNoise
         from dnet.servo.verdict import ServoSettings
-        from dnet.trials.methods import network_points
+        from dnet.trials.methods import points_of
         from dnet.trials.request import Trial
 
         self.check()
-        learned = controller == "deformernet"
+        of_hu = controller in ("hu", "hu-online")
+        checkpoint = self.hu_checkpoint if of_hu else self.checkpoint
         patience = self.patience
         if patience is None:
             patience = 0 if controller == "rrt" else ServoSettings.patience
@@ -78,7 +80,7 @@ class ServoOptions:
             goal=goal,
             out=out,
             controller=controller,
-            checkpoint=self.checkpoint,
+            checkpoint=checkpoint,
             grasp=self.grasp,
             grasp_checkpoint=self.grasp_checkpoint,
             settings=ServoSettings(
@@ -91,7 +93,7 @@ class ServoOptions:
                 regrasps=self.regrasp,
             ),
             laboratory=LaboratorySettings(
-                points=network_points(self.checkpoint) if learned else POINTS,
+                points=points_of(controller, checkpoint),
                 world=self.world,
                 noise=DepthNoise(scale=self.depth_noise) if self.depth_noise else None,
             ),
@@ -144,8 +146,9 @@ class Servo:
     """Episode file and the number of the frame to reach, by default its last; or a cloud (.npy,
     .ply, .pcd; metres, world frame); or `random`, a displacement drawn as `dnet record` does."""
     controller: Controller = "deformernet"
-    """What decides the motions: a trained network; the true displacement, known to the simulator
-    alone; nothing, which never moves; random trials, of which those that help are kept."""
+    """What decides the motions: a trained network; that of Hu et al., as it was trained or going on
+    learning from what its motions do; the true displacement, known to the simulator alone; nothing,
+    which never moves; random trials, of which those that help are kept."""
     goals: Annotated[Path | None, tyro.conf.arg(metavar="DIRECTORY")] = None
     """A run for each episode (its last frame) and each cloud in it. Called again, it goes on."""
     jobs: int = 1

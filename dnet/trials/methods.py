@@ -8,20 +8,23 @@ from pathlib import Path
 import numpy as np
 
 import dnet
-from dnet.errors import BadCheckpoint, UnknownTruth
+from dnet.errors import BadCheckpoint, NoNetwork, UnknownTruth
 from dnet.laboratory import Laboratory
 from dnet.nets.deformernet import DeformerNet
+from dnet.nets.hu import HuNet
 from dnet.nets.keypoints import KeypointNet
 from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.onnx_network import OnnxDeformerNet
+from dnet.perception.cloud import POINTS
 from dnet.servo.controllers import Controller, Nothing, Oracle
 from dnet.servo.displacement_heuristic import DisplacementHeuristic
 from dnet.servo.grasp_pickers import FarthestPoint, MostDisplaced, NetworkPicker
+from dnet.servo.online import OnlineHu
 from dnet.servo.pickers import Picker, TruePoint
 from dnet.servo.random_trials import RandomTree
 from dnet.training.checkpoints import load_kind
 from dnet.trials.goals import Task
-from dnet.trials.request import Trial
+from dnet.trials.request import ControllerName, Trial
 from dnet.weights import DEFORMERNET, DENSE, KEYPOINTS, REGRESSOR
 
 
@@ -35,18 +38,31 @@ class Setting:
 
 
 def _deformernet(setting: Setting) -> Controller:
-    trial = setting.trial
-    model = _network(trial.checkpoint)
-    points = len(setting.task.goal.cloud)
-    if points != model.config.points:
-        raise BadCheckpoint(
-            trial.checkpoint or DEFORMERNET,
-            f"takes clouds of {model.config.points} points, the goal has {points}",
-            "use a network trained on clouds like the goal's",
-        )
+    model = _network(setting.trial.checkpoint)
+    _check_points(setting, model.config.points)
     # The goal is encoded, and kernels are loaded, before the run: no step waits for it.
     model.predict(setting.task.goal.cloud, setting.task.goal.cloud)
     return model
+
+
+def _hu(setting: Setting) -> HuNet:
+    model = _hu_network(setting.trial.controller, setting.trial.checkpoint)
+    _check_points(setting, model.config.points)
+    return model
+
+
+def _hu_online(setting: Setting) -> Controller:
+    return OnlineHu(_hu(setting), lambda: setting.lab.world.tip)
+
+
+def _check_points(setting: Setting, want: int) -> None:
+    points = len(setting.task.goal.cloud)
+    if points != want:
+        raise BadCheckpoint(
+            setting.trial.checkpoint or DEFORMERNET,
+            f"takes clouds of {want} points, the goal has {points}",
+            "use a network trained on clouds like the goal's",
+        )
 
 
 def _oracle(setting: Setting) -> Controller:
@@ -75,6 +91,8 @@ def _rrt(setting: Setting) -> Controller:
 
 CONTROLLERS: Mapping[str, Callable[[Setting], Controller]] = {
     "deformernet": _deformernet,
+    "hu": _hu,
+    "hu-online": _hu_online,
     "oracle": _oracle,
     "none": _none,
     "rrt": _rrt,
@@ -124,10 +142,22 @@ def _network(checkpoint: Path | None) -> DeformerNet | OnnxDeformerNet:
     return dnet.load() if checkpoint is None else dnet.load(checkpoint)
 
 
-def network_points(checkpoint: Path | None) -> int:
-    """Return how many points the clouds of a network have.
+@lru_cache(maxsize=4)
+def _hu_network(controller: str, checkpoint: Path | None) -> HuNet:
+    if checkpoint is None:
+        raise NoNetwork(f"--controller {controller}", "--hu-checkpoint", "hu")
+    return load_kind(checkpoint, HuNet)
+
+
+def points_of(controller: ControllerName, checkpoint: Path | None) -> int:
+    """Return how many points the clouds have that a controller sees.
 
     Raises:
         BadCheckpoint: If there is no such network.
+        NoNetwork: If it needs one, and none is given and none ships.
     """
-    return _network(checkpoint).config.points
+    if controller == "deformernet":
+        return _network(checkpoint).config.points
+    if controller in ("hu", "hu-online"):
+        return _hu_network(controller, checkpoint).config.points
+    return POINTS

@@ -8,9 +8,11 @@ from typing import Literal
 from dnet.laboratory import LaboratorySettings
 from dnet.servo.verdict import ServoSettings
 
-ControllerName = Literal["deformernet", "oracle", "none", "rrt"]
-"""`deformernet`: a trained network; `oracle`: knows the true motion; `none`: never moves; `rrt`:
-tries at random."""
+ControllerName = Literal["deformernet", "hu", "hu-online", "oracle", "none", "rrt"]
+"""`deformernet`: a trained network; `hu`: that of Hu et al.; `hu-online`: the same, which goes on
+learning; `oracle`: knows the true motion; `none`: never moves; `rrt`: tries at random."""
+LEARNED: tuple[ControllerName, ...] = ("deformernet", "hu", "hu-online")
+"""Controllers that have a network."""
 GraspName = Literal["truth", "keypoints", "regressor", "dense", "displaced", "farthest"]
 """`truth`: the point at which the goal was made; `keypoints`: where those are that move most;
 `regressor`, `dense`: networks that answer with a position, or with a score for each point;

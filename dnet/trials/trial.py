@@ -24,7 +24,7 @@ from dnet.trials.eyes import Eyes
 from dnet.trials.goals import Task, read_task
 from dnet.trials.log import Free, Say, TrialLog, free_bytes, pose_of
 from dnet.trials.methods import CONTROLLERS, PICKERS, Setting
-from dnet.trials.request import LATENCY, RECORDING, REFUSED, RUN, Trial
+from dnet.trials.request import LATENCY, LEARNED, RECORDING, REFUSED, RUN, Trial
 from dnet.types import Cloud, EpisodeMeta, Point, Trace
 
 
@@ -174,7 +174,7 @@ def _asked(trial: Trial) -> dict[str, Any]:
     checkpoint = trial.checkpoint.name if trial.checkpoint else f"dnet {dnet.__version__}"
     return {
         "controller": trial.controller,
-        "checkpoint": checkpoint if trial.controller == "deformernet" else None,
+        "checkpoint": checkpoint if trial.controller in LEARNED else None,
         "grasp": trial.grasp,
         "servo": asdict(trial.settings),
         "occlusion": trial.occlusion,

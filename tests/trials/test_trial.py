@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun_cli
+import torch
 from rerun.chunk import RrdReader
 
 from dnet.datasets.reader import EpisodeReader
-from dnet.errors import DiskAlmostFull, OtherRun, ShortCloud, UnknownTruth
+from dnet.errors import DiskAlmostFull, NoNetwork, OtherRun, ShortCloud, UnknownTruth
 from dnet.geometry.chamfer import chamfer
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
+from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.recorders.live_view import LiveView
 from dnet.recorders.run_sinks import LOST
 from dnet.servo.verdict import ServoSettings
+from dnet.training.checkpoints import save
 from dnet.trials.goals import read_task
 from dnet.trials.log import RESERVE
-from dnet.trials.request import Trial
+from dnet.trials.request import ControllerName, Trial
 from dnet.trials.trial import clear, is_finished, run_trial
 from dnet.types import ARMS, Cloud, Outcome, Point, Trace
 from tests.recorders.rrd import rows
@@ -95,6 +98,32 @@ def test_the_oracle_reaches_what_was_drawn(lab: Laboratory, tmp_path: Path) -> N
         np.testing.assert_allclose(run.grasps[-1], goal.grasp, atol=1e-3)
         assert run.kinds[0] == "rest"
         assert set(run.kinds[1:]) == {"shape"}
+
+
+def test_the_network_of_hu_servoes_and_may_go_on_learning(lab: Laboratory, tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    network = HuNet(HuNetConfig(points=LAB.points, components=8))
+    torch.nn.init.normal_(network.basis, std=10.0)
+    save(tmp_path / "hu.safetensors", network)
+    last = {}
+    names: tuple[ControllerName, ...] = ("hu", "hu-online")
+    for name in names:
+        settings = ServoSettings(steps=2, threshold=1e-6, patience=0)
+        asked = trial(
+            tmp_path / name,
+            controller=name,
+            checkpoint=tmp_path / "hu.safetensors",
+            settings=settings,
+        )
+        trace = run_trial(asked, lab, say=silent)
+        check_whole(tmp_path / name, trace, lab, "out_of_steps")
+        with EpisodeReader(tmp_path / name / "run.mcap") as run:
+            assert run.meta.settings["checkpoint"] == "hu.safetensors"
+        last[name] = [step.motion for step in trace.steps]
+    np.testing.assert_array_equal(last["hu"][0], last["hu-online"][0])
+    assert np.abs(last["hu"][-1] - last["hu-online"][-1]).max() > 1e-5
+    with pytest.raises(NoNetwork, match="--hu-checkpoint"):
+        run_trial(trial(tmp_path / "none", controller="hu"), lab, say=silent)
 
 
 def test_the_same_seed_writes_the_same_bytes(lab: Laboratory, tmp_path: Path) -> None:
