@@ -575,16 +575,6 @@ class UnusedOption(DnetError, ValueError):
         super().__init__(f"{option} does nothing without {needs}; leave one out or add the other")
 
 
-class NoNetwork(DnetError, ValueError):
-    """A method that needs a network, none of which ships."""
-
-    def __init__(self, what: str, option: str, model: str) -> None:
-        super().__init__(
-            f"{what} has no network that ships; train one with `dnet train --model {model}` and "
-            f"give it as {option}"
-        )
-
-
 class BadTables(DnetError, RuntimeError):
     """Tables of clouds that went missing or are damaged while a training reads them."""
 

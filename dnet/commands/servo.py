@@ -23,7 +23,8 @@ class ServoOptions:
     """Directory that `dnet train` wrote, one of its .safetensors files, or an .onnx of `dnet
     export`; the network that ships, unless given."""
     hu_checkpoint: Path | None = None
-    """Network of `hu` and `hu-online`: what `dnet train --model hu` wrote; none ships."""
+    """Network of `hu` and `hu-online`, likewise: what `dnet train --model hu` wrote; the one that
+    ships, unless given."""
     grasp: Grasp = "truth"
     """What decides where the object is grasped: the point at which the goal was made; keypoints,
     where those are that move most; a network that answers with a position (`regressor`), or with

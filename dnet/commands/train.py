@@ -56,10 +56,10 @@ class Train:
     none. All options must be as they were, but for --epochs and --minutes: with more of them a
     training goes on longer, its learning rate that of the new schedule."""
     weights: Annotated[str | None, tyro.conf.arg(metavar="PATH|shipped|random")] = None
-    """What to begin with: a run, a .safetensors file, the DeformerNet that `shipped`, or `random`
-    weights. A DeformerNet and `hu` begin with random ones, unless given, the others with what a
-    DeformerNet knows: `dense` with all of it, `grasp` and `keypoints` with its encoder. Options
-    of the network must be those that it has."""
+    """What to begin with: a run, a .safetensors file, the network that `shipped`, or `random`
+    weights. A DeformerNet and `hu` begin with random ones, unless given, the others with what the
+    DeformerNet that shipped knows: `dense` with all of it, `grasp` and `keypoints` with its
+    encoder. Options of the network must be those that it has."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""
@@ -280,14 +280,14 @@ class Train:
     def _begun_with(self) -> Path | None:
         """Return the file of the network to begin with; None for random weights."""
         from dnet.training.checkpoints import weights_file
-        from dnet.weights import DEFORMERNET
+        from dnet.weights import DEFORMERNET, HU
 
         usual = "random" if self.model in ("deformernet", "hu") else "shipped"
         match self.weights or usual:
             case "random":
                 return None
             case "shipped":
-                return DEFORMERNET
+                return HU if self.model == "hu" else DEFORMERNET
             case path:
                 return weights_file(Path(path))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import dnet
-from dnet.errors import BadCheckpoint, NoNetwork, UnknownTruth
+from dnet.errors import BadCheckpoint, UnknownTruth
 from dnet.laboratory import Laboratory
 from dnet.nets.deformernet import DeformerNet
 from dnet.nets.hu import HuNet
@@ -25,7 +25,7 @@ from dnet.servo.random_trials import RandomTree
 from dnet.training.checkpoints import load_kind
 from dnet.trials.goals import Task
 from dnet.trials.request import ControllerName, Trial
-from dnet.weights import DEFORMERNET, DENSE, KEYPOINTS, REGRESSOR
+from dnet.weights import DEFORMERNET, DENSE, HU, KEYPOINTS, REGRESSOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ class Setting:
 
 def _deformernet(setting: Setting) -> Controller:
     model = _network(setting.trial.checkpoint)
-    _check_points(setting, model.config.points)
+    _check_points(setting, model.config.points, shipped=DEFORMERNET)
     # The goal is encoded, and kernels are loaded, before the run: no step waits for it.
     model.predict(setting.task.goal.cloud, setting.task.goal.cloud)
     return model
 
 
 def _hu(setting: Setting) -> HuNet:
-    model = _hu_network(setting.trial.controller, setting.trial.checkpoint)
-    _check_points(setting, model.config.points)
+    model = _hu_network(setting.trial.checkpoint)
+    _check_points(setting, model.config.points, shipped=HU)
     return model
 
 
@@ -55,11 +55,11 @@ def _hu_online(setting: Setting) -> Controller:
     return OnlineHu(_hu(setting), lambda: setting.lab.world.tip)
 
 
-def _check_points(setting: Setting, want: int) -> None:
+def _check_points(setting: Setting, want: int, *, shipped: Path) -> None:
     points = len(setting.task.goal.cloud)
     if points != want:
         raise BadCheckpoint(
-            setting.trial.checkpoint or DEFORMERNET,
+            setting.trial.checkpoint or shipped,
             f"takes clouds of {want} points, the goal has {points}",
             "use a network trained on clouds like the goal's",
         )
@@ -143,10 +143,8 @@ def _network(checkpoint: Path | None) -> DeformerNet | OnnxDeformerNet:
 
 
 @lru_cache(maxsize=4)
-def _hu_network(controller: str, checkpoint: Path | None) -> HuNet:
-    if checkpoint is None:
-        raise NoNetwork(f"--controller {controller}", "--hu-checkpoint", "hu")
-    return load_kind(checkpoint, HuNet)
+def _hu_network(checkpoint: Path | None) -> HuNet:
+    return load_kind(checkpoint or HU, HuNet)
 
 
 def points_of(controller: ControllerName, checkpoint: Path | None) -> int:
@@ -154,10 +152,9 @@ def points_of(controller: ControllerName, checkpoint: Path | None) -> int:
 
     Raises:
         BadCheckpoint: If there is no such network.
-        NoNetwork: If it needs one, and none is given and none ships.
     """
     if controller == "deformernet":
         return _network(checkpoint).config.points
     if controller in ("hu", "hu-online"):
-        return _hu_network(controller, checkpoint).config.points
+        return _hu_network(checkpoint).config.points
     return POINTS
