@@ -1,7 +1,7 @@
 """The sides of an object on a table that a camera above it does not see."""
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float32, Float64
 from scipy.spatial import ConvexHull, cKDTree
 
 from dnet.types import Cloud
@@ -39,3 +39,17 @@ def hidden_sides(cloud: Cloud) -> Float32[np.ndarray, "walls 3"]:
         [np.repeat(outline[:, None], HEIGHTS, axis=1), heights[..., None]], axis=2
     )
     return walls.reshape(-1, 3).astype(np.float32)
+
+
+def side_normals(walls: Float32[np.ndarray, "walls 3"]) -> Float64[np.ndarray, "walls 3"]:
+    """Return the unit normals of walls of `hidden_sides`, level and outwards.
+
+    Each is square to the way from the last step of the outline to the next; at a corner it is half
+    way between those of the two walls.
+    """
+    outline = walls.reshape(AROUND, HEIGHTS, 3)[:, 0, :2].astype(np.float64)
+    along = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
+    # The hull is walked against the clock, so that outside is to the right.
+    outwards = np.stack([along[:, 1], -along[:, 0], np.zeros(AROUND)], axis=1)
+    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    return np.repeat(outwards, HEIGHTS, axis=0)

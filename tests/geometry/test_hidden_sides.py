@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dnet.geometry.hidden_sides import SIDE_POINTS, hidden_sides
+from dnet.geometry.hidden_sides import SIDE_POINTS, hidden_sides, side_normals
 from dnet.types import Cloud
 
 SIZE = np.array([0.1, 0.08, 0.04])
@@ -43,3 +43,17 @@ def test_a_unit_does_not_matter_and_the_same_cloud_has_the_same_sides() -> None:
     cloud = seen_box()
     np.testing.assert_allclose(hidden_sides(10 * cloud), 10 * hidden_sides(cloud), atol=1e-4)
     np.testing.assert_array_equal(hidden_sides(cloud), hidden_sides(cloud.copy()))
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_normals_of_sides_point_outwards_and_are_square_to_them(turn: float) -> None:
+    walls = hidden_sides(seen_box(turn))
+    found = side_normals(walls)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+    assert not found[:, 2].any()
+    assert ((walls[:, :2] * found[:, :2]).sum(axis=1) > 0).all()
+    cosine, sine = np.cos(turn), np.sin(turn)
+    rotation = np.array([[cosine, -sine], [sine, cosine]])
+    straight = np.abs(found[:, :2] @ rotation).max(axis=1)
+    # All but the steps next to the four corners.
+    assert (straight > 0.999).mean() > 0.85

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from dnet.errors import NoDisplacement, OutOfReach
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.keypoints import Keypoints
-from dnet.servo.displacement_heuristic import DisplacementHeuristic, top_weights
+from dnet.servo.displacement_heuristic import DisplacementHeuristic, top_weights, with_hidden
 from dnet.sim.scenes import Workspace
 from dnet.types import Cloud
 
@@ -100,3 +100,47 @@ def test_weights_are_powers_of_the_greatest_displacements_in_proportion(
     assert displacement[others].max(initial=0) <= displacement[counted].min()
     ratio = weights[counted] / (displacement[counted] / displacement.max()) ** power
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-4)
+
+
+def box_top_and_front() -> Cloud:
+    """What a camera at -y sees of a box on a table: not the side at +x."""
+    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 41), np.linspace(-0.05, 0.05, 41))
+    top = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.04)])
+    x, z = np.meshgrid(np.linspace(-0.05, 0.05, 41), np.linspace(0.0, 0.04, 17))
+    front = np.column_stack([x.ravel(), np.full(x.size, -0.05), z.ravel()])
+    return np.concatenate([top, front]).astype(np.float32)
+
+
+def test_where_motion_grows_towards_a_side_that_is_not_seen_that_is_grasped() -> None:
+    def pulled(points: Cloud) -> Cloud:
+        far = 0.3 * (points[:, 0] + 0.05) - 0.3 * points[:, 2] + 0.02
+        return (points + far[:, None] * [1.0, 0.0, 0.0]).astype(np.float32)
+
+    def found_among_the_seen(initial: Cloud, goal: Cloud) -> Keypoints:
+        points = farthest_points(initial, 200)
+        return Keypoints(points, pulled(points), 0.0)
+
+    cloud = box_top_and_front()
+    found = DisplacementHeuristic(found_among_the_seen).choose(cloud, pulled(cloud))
+    assert len(found.displacement) == len(found.keypoints.initial) > 200
+    assert found.point[0] == pytest.approx(0.05, abs=1e-3)
+    assert found.point[2] < 0.02
+    assert np.linalg.norm(cloud - found.point, axis=1).min() > 0.004
+
+
+def test_displacements_of_hidden_keypoints_follow_an_affine_map_beyond_those_known() -> None:
+    known = farthest_points(box_top_and_front(), 200)
+    stretch = np.array([[1.1, 0.2, 0.0], [0.0, 0.9, 0.1], [0.1, 0.0, 1.2]], np.float32)
+    hidden = np.array([[0.05, 0.0, 0.01], [0.05, 0.03, 0.02]], np.float32)
+    found = with_hidden(Keypoints(known, known @ stretch, 0.0), hidden)
+    np.testing.assert_allclose(found.initial[200:], hidden)
+    np.testing.assert_allclose(found.goal[200:], hidden @ stretch, atol=1e-5)
+    np.testing.assert_array_equal(found.goal[:200], known @ stretch)
+
+
+def test_hidden_keypoints_of_a_plane_move_as_the_nearest() -> None:
+    known = farthest_points(slab(), 50)
+    moved = (known + [0.0, 0.0, 0.01]).astype(np.float32)
+    hidden = np.array([[0.05, 0.0, 0.01]], np.float32)
+    found = with_hidden(Keypoints(known, moved, 0.0), hidden)
+    np.testing.assert_allclose(found.goal[50:], hidden + [0, 0, 0.01], atol=1e-6)
