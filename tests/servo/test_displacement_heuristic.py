@@ -140,7 +140,8 @@ def test_displacements_of_hidden_keypoints_follow_an_affine_map_beyond_those_kno
 
 def test_hidden_keypoints_of_a_plane_move_as_the_nearest() -> None:
     known = farthest_points(slab(), 50)
-    moved = (known + [0.0, 0.0, 0.01]).astype(np.float32)
+    lift = np.array([0.0, 0.0, 0.01], np.float32)
+    moved = known + lift
     hidden = np.array([[0.05, 0.0, 0.01]], np.float32)
     found = with_hidden(Keypoints(known, moved, 0.0), hidden)
-    np.testing.assert_allclose(found.goal[50:], hidden + [0, 0, 0.01], atol=1e-6)
+    np.testing.assert_allclose(found.goal[50:], hidden + lift, atol=1e-6)
