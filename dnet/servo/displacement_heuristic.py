@@ -101,7 +101,7 @@ class DisplacementHeuristic:
             raise OutOfReach(len(initial))
         _, own = cKDTree(initial).query(keypoints.initial)
         # A few keypoints may have no one within reach: then all may count.
-        counted = within[own] if within[own].any() else np.ones(len(own), bool)
+        counted = within[own] if within[own].any() else np.ones(len(keypoints.initial), bool)
         counted = np.concatenate([counted, np.ones(len(hidden), bool)])
         every = with_hidden(keypoints, hidden)
         displacement = np.linalg.norm(every.goal - every.initial, axis=1)
