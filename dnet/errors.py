@@ -337,6 +337,13 @@ class BrokenLimit(DnetError, RuntimeError):
         )
 
 
+class BadReport(DnetError, ValueError):
+    """Something that a report is made from, and that cannot be read."""
+
+    def __init__(self, path: Path, why: str, way_out: str) -> None:
+        super().__init__(f"{path} {why}; {way_out}")
+
+
 class MissingExtra(DnetError, ImportError):
     """A package that only some need, and that is not installed."""
 

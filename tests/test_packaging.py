@@ -40,6 +40,7 @@ def test_the_wheel_holds_every_module_of_the_tree(names: list[str]) -> None:
     }
     assert inside <= set(names)
     assert "dnet/py.typed" in names
+    assert "dnet/evaluation/report/page.html.j2" in names
     assert not [name for name in names if "test" in name.lower()]
 
 

@@ -9,6 +9,7 @@ import tyro
 from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.evaluate_importance import Importance
 from dnet.commands.evaluate_keypoints import EvaluateKeypoints
+from dnet.commands.evaluate_paper import Paper, list_experiments
 from dnet.commands.evaluate_servo import ServoGoals
 from dnet.commands.train import Train
 
@@ -181,20 +182,31 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measure a network, keypoints, ways to grasp, servo runs, or choices in training.
+    """Reproduce the paper, or measure a network, keypoints, grasps, servo runs, or trainings.
+
+    Example: dnet evaluate --list
+
+    Example: dnet evaluate paper --out report --scale 0.02
 
     Example: dnet evaluate network --checkpoint runs/paper --from-mcap data/organs
     """
 
     experiment: tyro.conf.OmitSubcommandPrefixes[
-        Annotated[Network, tyro.conf.subcommand("network")]
+        Annotated[Paper, tyro.conf.subcommand("paper")]
+        | Annotated[Network, tyro.conf.subcommand("network")]
         | Annotated[Grasp, tyro.conf.subcommand("grasp")]
         | Annotated[ServoGoals, tyro.conf.subcommand("servo")]
         | Annotated[Importance, tyro.conf.subcommand("importance")]
         | Annotated[EvaluateKeypoints, tyro.conf.subcommand("keypoints")]
         | Annotated[Ablations, tyro.conf.subcommand("ablations")]
-    ]
+        | Annotated[None, tyro.conf.subcommand("list", description="The same as --list.")]
+    ] = None
+    list: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Tell which experiments `paper` consists of: what each reproduces, needs and costs."""
 
     def run(self) -> None:
         """Run the experiment."""
-        self.experiment.run()
+        if self.experiment is None or self.list:
+            list_experiments()
+        else:
+            self.experiment.run()

@@ -1,0 +1,96 @@
+"""The experiment `goals`: a hundred unseen goals, several controllers, several ways to grasp."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from dnet.commands.paper.episodes import unseen_episodes
+from dnet.commands.paper.request import PaperRequest
+from dnet.commands.servo import Controller, Grasp, ServoOptions
+from dnet.commands.servo_batch import finish
+from dnet.evaluation.report.asked import write_asked
+from dnet.evaluation.servo_goals import draw_goals
+from dnet.training.checkpoints import weights_file
+from dnet.trials.request import Trial
+from dnet.weights import DEFORMERNET, DENSE, KEYPOINTS, REGRESSOR
+
+GOALS = 100
+METHODS: tuple[tuple[Controller, Grasp], ...] = (
+    ("none", "truth"),
+    ("deformernet", "truth"),
+    ("deformernet", "keypoints"),
+    ("deformernet", "regressor"),
+    ("deformernet", "dense"),
+    ("oracle", "truth"),
+    ("rrt", "truth"),
+)
+
+
+def run_goals(request: PaperRequest) -> None:
+    """Carry out the runs that are not there yet.
+
+    Raises:
+        DnetError: If the episodes will not do, or a directory holds other runs.
+        KeyboardInterrupt: After Ctrl-C.
+    """
+    folder = request.out / "goals"
+    episodes = unseen_episodes(request, request.count(GOALS))
+    goals = draw_goals(
+        episodes.folder,
+        episodes.unseen.episodes_seen,
+        count=request.count(GOALS),
+        seed=request.seed,
+    )
+    options = ServoOptions(world="quasistatic", checkpoint=request.checkpoint, seed=request.seed)
+    trials = {
+        method_name(*method): trials_of(*method, goals=goals, folder=folder, options=options)
+        for method in METHODS
+    }
+    asked = request.asked(
+        GOALS,
+        weights=weights_of(request),
+        data={episodes.folder.name: episodes.unseen.fingerprint},
+        options={"world": options.world, "steps": options.steps},
+        runs=directories(trials, folder),
+    )
+    write_asked(folder, asked)
+    finish([one for some in trials.values() for one in some], jobs=request.jobs, what="goals")
+
+
+def method_name(controller: str, grasp: str) -> str:
+    """Return what a method is called: how it grasps is said where it is not told."""
+    return controller if grasp == "truth" else f"{controller} + {grasp}"
+
+
+def trials_of(
+    controller: Controller,
+    grasp: Grasp,
+    *,
+    goals: list[str],
+    folder: Path,
+    options: ServoOptions,
+    recording: bool = False,
+) -> list[Trial]:
+    """Return a run to each goal, each in a directory of its method's."""
+    plain = replace(options, grasp=grasp).trial("", folder, controller=controller)
+    place = folder / method_name(controller, grasp).replace(" + ", "-")
+    trials = [replace(plain, goal=goal, recording=recording) for goal in goals]
+    return [replace(one, out=place / one.goal_name) for one in trials]
+
+
+def directories(trials: dict[str, list[Trial]], folder: Path) -> dict[str, tuple[str, ...]]:
+    """Return the directories of the runs of each method, from that of the experiment."""
+    return {
+        name: tuple(one.out.relative_to(folder).as_posix() for one in some)
+        for name, some in trials.items()
+    }
+
+
+def weights_of(request: PaperRequest) -> dict[str, Path]:
+    """Return the files of all networks that servo runs use."""
+    own = request.checkpoint
+    return {
+        "deformernet": DEFORMERNET if own is None else weights_file(own),
+        "keypoints": KEYPOINTS,
+        "regressor": REGRESSOR,
+        "dense": DENSE,
+    }

@@ -1,0 +1,64 @@
+"""What an experiment was asked to do: written before it begins, read when it is reported."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dnet.errors import BadReport
+
+ASKED = "asked.json"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was asked of one experiment, and with what."""
+
+    count: int
+    """Cases, goals or the like."""
+    full: int
+    """As many as the paper has."""
+    seed: int
+    scale: float
+    versions: Mapping[str, str]
+    weights: Mapping[str, str]
+    """SHA-256 of each network, its beginning."""
+    data: Mapping[str, str]
+    """Fingerprint of the settled frames of each set of episodes."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    runs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Of each method, the directories of its runs, in that of the experiment."""
+
+    @property
+    def reduced(self) -> str:
+        """How a figure is to be read that rests on less than the paper's; empty if on as much."""
+        if self.count >= self.full:
+            return ""
+        return f"on {self.count} of {self.full}, at scale {self.scale:g}"
+
+
+def write_asked(folder: Path, asked: Asked) -> None:
+    """Write down what is asked of the experiment in a directory."""
+    folder.mkdir(parents=True, exist_ok=True)
+    part = folder / f".{ASKED}.part"
+    part.write_text(json.dumps(asdict(asked), indent=2) + "\n", encoding="utf-8")
+    part.replace(folder / ASKED)
+
+
+def read_asked(folder: Path) -> Asked | None:
+    """Return what was asked of the experiment in a directory; None if nothing was.
+
+    Raises:
+        BadReport: If that cannot be read.
+    """
+    path = folder / ASKED
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        runs = {method: tuple(names) for method, names in content.pop("runs").items()}
+        return Asked(**content, runs=runs)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        way_out = f"remove {folder}, and run it again"
+        raise BadReport(path, f"is unreadable ({error!r})", way_out) from error

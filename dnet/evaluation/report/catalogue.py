@@ -1,0 +1,42 @@
+"""The experiments that the paper is reproduced by: what each shows, needs and costs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+ExperimentName = Literal["grasp", "networks", "goals", "cases", "importance", "generalisation"]
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One of them."""
+
+    title: str
+    reproduces: str
+    """What of the paper."""
+    needs: str
+    """Besides the networks that ship."""
+    cost: str
+    """At full size, in time of one processor core."""
+
+
+EXPERIMENTS: Mapping[ExperimentName, Experiment] = {
+    "grasp": Experiment(
+        "Where to grasp",
+        "table 1: distance of the manipulation point over 100 cases",
+        "episodes: given, or recorded (25 x 4 shapes)",
+        "2 minutes",
+    ),
+    "networks": Experiment(
+        "DeformerNet against Hu et al.",
+        "figure 1, and the losses on the full dataset and on a few shapes",
+        "trainings: --runs; without, the network that ships alone is judged",
+        "2 minutes",
+    ),
+    "goals": Experiment(
+        "A hundred unseen goals",
+        "success over the tolerance, against baselines (of the follow-ups)",
+        "episodes, as for grasp; for hu a training in --runs",
+        "2 hours",
+    ),
+}
