@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dnet.commands.paper.request import PaperRequest
     from dnet.evaluation.report.values import Report
 
-Name = Literal["grasp", "networks", "goals"]
+Name = Literal["grasp", "cases", "importance", "networks", "goals"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,9 @@ class Paper:
     """Trainings of `dnet train`, each in a directory of its own: their errors are compared."""
     checkpoint: Path | None = None
     """DeformerNet to judge and to drive with; the one that ships, unless given."""
+    world: Literal["bullet", "quasistatic"] = "bullet"
+    """Where the servo cases happen: in PyBullet, or in equilibria of the same energy, faster. All
+    else is in the quasi-static world, of which the networks that ship are."""
     jobs: int = 1
     """Processes."""
     seed: int = 0
@@ -98,6 +101,7 @@ class Paper:
             validation=self.validation,
             runs=self.runs,
             checkpoint=self.checkpoint,
+            world=self.world,
             scale=self.scale,
             jobs=self.jobs,
             seed=self.seed,
@@ -120,18 +124,12 @@ class Paper:
             raise MissingPath(self.out, "report", "run it without --from-logs")
 
     def _say(self, report: "Report") -> None:
-        from rich.console import Console
-        from rich.table import Table
-
         from dnet.evaluation.report.writing import PAGE
 
-        table = Table("in the paper", "what", "paper", "ours", "", show_lines=False)
         for claim in report.claims:
-            ours = claim.ours or "–"
-            table.add_row(claim.where, claim.what, claim.paper, ours, claim.verdict)
-        console = Console()
-        console.print(table)
-        console.print(str(self.out / PAGE), highlight=False, soft_wrap=True)
+            ours = f"{claim.ours} (paper: {claim.paper})" if claim.ours else claim.reason
+            print(f"{claim.verdict:13} {claim.where}: {claim.what}: {ours}")
+        print(self.out / PAGE)
 
 
 def list_experiments() -> None:

@@ -13,12 +13,16 @@ import pytest
 
 from dnet.cli import main
 from dnet.commands.evaluate_paper import Paper
+from dnet.datasets.reader import EpisodeReader
 from dnet.errors import MissingExtra, MissingPath, NotAFraction
 from dnet.evaluation.report.catalogue import EXPERIMENTS
 from dnet.evaluation.report.page import require_report
 from dnet.evaluation.report.reading import read_report
+from dnet.evaluation.report.values import LinePlot
 from dnet.evaluation.servo_scores import read_score
+from dnet.geometry.chamfer import chamfer
 
+SMALL = ("--scale", "0.01", "--world", "quasistatic")
 NAMES = ("report.html", "report.md", "report.csv")
 
 
@@ -29,7 +33,7 @@ def evaluate(out: Path, *more: str) -> None:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper") / "report"
-    evaluate(out, "--scale", "0.01")
+    evaluate(out, *SMALL)
     return out
 
 
@@ -56,7 +60,7 @@ def test_a_second_call_runs_nothing(made: Path) -> None:
         return {path: path.stat().st_mtime_ns for path in there}
 
     before = logs()
-    evaluate(made, "--scale", "0.01")
+    evaluate(made, *SMALL)
     assert logs() == before
     assert len(before) > 7
 
@@ -74,6 +78,28 @@ def test_the_figures_are_those_of_the_logs(made: Path) -> None:
     for row in pl.read_csv(made / "tables" / "grasp.csv").rows(named=True):
         mine = choices.filter(pl.col("method") == row["method"])["distance"]
         assert row["mean, mm"] == pytest.approx(1e3 * float(np.mean(mine.to_numpy())))
+
+
+def test_the_cases_are_told_as_their_logs_have_them(made: Path) -> None:
+    rows = pl.read_csv(made / "tables" / "cases.csv").rows(named=True)
+    assert [row["method"] for row in rows] == ["keypoints", "regressor"]
+    report = read_report(made)
+    plots = {plot.name: plot for section in report.sections for plot in section.plots}
+    curves = plots["cases-over-time"]
+    assert isinstance(curves, LinePlot)
+    for row, line in zip(rows, curves.panels[0].lines, strict=True):
+        with EpisodeReader(made / "cases" / row["method"] / "case-1" / "run.mcap") as run:
+            goal = run.goal()
+            assert goal is not None
+            distances = [1e3 * chamfer(run.cloud(index), goal) for index in range(len(run))]
+            off = np.subtract(run.meta.scene.manipulation_point, run.meta.settings["true_point"])
+            assert row["goal"] == run.meta.settings["goal"] == "random:2000000"
+        np.testing.assert_allclose(line.y, distances)
+        assert row["Chamfer, end, mm"] == pytest.approx(distances[-1])
+        assert row["point off, mm"] == pytest.approx(1e3 * np.linalg.norm(off))
+    claims = {claim.where: claim for claim in report.claims}
+    assert all(claims[f"figure {number}"].met is not None for number in range(1, 7))
+    assert claims["figure 3"].reason.startswith("on 1 of 4, at scale 0.01")
 
 
 def test_page_text_and_tables_tell_the_same(made: Path) -> None:

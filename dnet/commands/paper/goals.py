@@ -1,5 +1,6 @@
 """The experiment `goals`: a hundred unseen goals, several controllers, several ways to grasp."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -77,7 +78,7 @@ def trials_of(
     return [replace(one, out=place / one.goal_name) for one in trials]
 
 
-def directories(trials: dict[str, list[Trial]], folder: Path) -> dict[str, tuple[str, ...]]:
+def directories(trials: Mapping[str, list[Trial]], folder: Path) -> dict[str, tuple[str, ...]]:
     """Return the directories of the runs of each method, from that of the experiment."""
     return {
         name: tuple(one.out.relative_to(folder).as_posix() for one in some)

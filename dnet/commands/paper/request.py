@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rich.console import Console
 
@@ -34,6 +34,8 @@ class PaperRequest:
     """Directory of trainings."""
     checkpoint: Path | None = None
     """The DeformerNet to drive with; None for the one that ships."""
+    world: Literal["bullet", "quasistatic"] = "bullet"
+    """Where the cases of the paper happen, and the two manipulation points."""
     scale: float = 1.0
     jobs: int = 1
     seed: int = 0

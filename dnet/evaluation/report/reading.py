@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Protocol
 
 from dnet.evaluation.report.asked import Asked, read_asked
+from dnet.evaluation.report.cases_section import cases_section
 from dnet.evaluation.report.catalogue import EXPERIMENTS, ExperimentName
 from dnet.evaluation.report.goals_section import goals_section
 from dnet.evaluation.report.grasp_section import grasp_section
+from dnet.evaluation.report.importance_section import importance_section
 from dnet.evaluation.report.networks_section import networks_section
 from dnet.evaluation.report.values import Cell, Column, Report, Section, Sheet
 
@@ -22,6 +24,8 @@ class Read(Protocol):
 
 SECTIONS: Mapping[ExperimentName, Read] = {
     "grasp": grasp_section,
+    "cases": cases_section,
+    "importance": importance_section,
     "networks": networks_section,
     "goals": goals_section,
 }

@@ -100,5 +100,5 @@ def _space(plot: SpacePlot) -> Figure:
     axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
     axes.set_aspect("equal")
     axes.view_init(elev=35, azim=-70)
-    axes.legend(frameon=False, markerscale=2)
+    axes.legend(frameon=False, markerscale=0.8)
     return figure

@@ -1,0 +1,49 @@
+"""The experiment `cases`: the four servo cases of the paper, by keypoints and by the regressor."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from dnet.commands.paper.goals import directories, weights_of
+from dnet.commands.paper.request import PaperRequest
+from dnet.commands.servo import Grasp, ServoOptions
+from dnet.commands.servo_batch import finish
+from dnet.evaluation.report.asked import write_asked
+from dnet.trials.request import Trial
+
+SEEDS = (2_000_000, 2_000_001, 2_000_002, 2_000_003)
+"""Of the goals, which nothing was chosen by: the first four of a range that nothing else uses."""
+GRASPS: tuple[Grasp, ...] = ("keypoints", "regressor")
+
+
+def run_cases(request: PaperRequest) -> None:
+    """Carry out the runs that are not there yet.
+
+    Raises:
+        DnetError: If a directory holds other runs.
+        KeyboardInterrupt: After Ctrl-C.
+    """
+    folder = request.out / "cases"
+    seeds = SEEDS[: request.count(len(SEEDS))]
+    options = ServoOptions(world=request.world, checkpoint=request.checkpoint, seed=request.seed)
+    trials: dict[str, list[Trial]] = {
+        grasp: _trials(grasp, seeds, options, folder) for grasp in GRASPS
+    }
+    asked = request.asked(
+        len(SEEDS),
+        weights=weights_of(request),
+        data={},
+        options={"world": request.world, "goals": [f"random:{seed}" for seed in seeds]},
+        runs=directories(trials, folder),
+    )
+    write_asked(folder, asked)
+    finish([one for some in trials.values() for one in some], jobs=request.jobs, what="cases")
+
+
+def _trials(
+    grasp: Grasp, seeds: tuple[int, ...], options: ServoOptions, folder: Path
+) -> list[Trial]:
+    plain = replace(options, grasp=grasp).trial("", folder, controller="deformernet")
+    return [
+        replace(plain, goal=f"random:{seed}", out=folder / grasp / f"case-{number}")
+        for number, seed in enumerate(seeds, start=1)
+    ]
