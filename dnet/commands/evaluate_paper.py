@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dnet.commands.paper.request import PaperRequest
     from dnet.evaluation.report.values import Report
 
-Name = Literal["grasp", "cases", "importance", "networks", "goals"]
+Name = Literal["grasp", "cases", "importance", "networks", "goals", "generalisation"]
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,21 @@ import pytest
 
 from dnet.cli import main
 from dnet.commands.evaluate_paper import Paper
+from dnet.commands.paper.generalisation import run_generalisation
+from dnet.commands.paper.request import PaperRequest
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import MissingExtra, MissingPath, NotAFraction
 from dnet.evaluation.report.catalogue import EXPERIMENTS
+from dnet.evaluation.report.conditions import CONDITIONS
 from dnet.evaluation.report.page import require_report
 from dnet.evaluation.report.reading import read_report
 from dnet.evaluation.report.values import LinePlot
 from dnet.evaluation.servo_scores import read_score
 from dnet.geometry.chamfer import chamfer
 
-SMALL = ("--scale", "0.01", "--world", "quasistatic")
+# Every experiment but the one that records for each condition: it has a test of its own.
+ONLY = [f"--only={name}" for name in ("grasp", "cases", "importance", "networks", "goals")]
+SMALL = ("--scale", "0.01", "--world", "quasistatic", *ONLY)
 NAMES = ("report.html", "report.md", "report.csv")
 
 
@@ -126,6 +131,30 @@ def test_the_page_needs_nothing_else(made: Path) -> None:
     for link in (one for one in links if not one.startswith("data:")):
         assert (made / link).is_file(), link
     assert any(link.endswith("run.mcap") for link in links)
+
+
+def test_conditions_are_reported_or_said_to_be_missing(tmp_path: Path) -> None:
+    some = [one for one in CONDITIONS if one.name in ("noise 1", "512 points")]
+    run_generalisation(PaperRequest(tmp_path, scale=0.05), some)
+    (section,) = (one for one in read_report(tmp_path).sections if one.name == "generalisation")
+    noisy, missing = section.sheets[0].texts()
+    assert noisy[:5] == [
+        "noise 1",
+        "noise of the depth camera, of a Kinect",
+        "out of distribution",
+        "1",
+        "0",
+    ]
+    assert missing[3:6] == ["0", "–", "give --runs with a `dnet train --points 512`"]
+    (link,) = section.runs
+    with EpisodeReader(tmp_path / link.files[0]) as run:
+        assert run.meta.settings["noise"]["scale"] == 1.0
+        goal = run.target()
+        assert goal is not None
+        assert goal.again is not None
+        floor, last = chamfer(goal.again, goal.cloud), chamfer(run.cloud(len(run) - 1), goal.cloud)
+    told = section.sheets[0].rows[0]
+    assert told[7:9] == (pytest.approx(1e3 * last), pytest.approx(1e3 * floor))
 
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")

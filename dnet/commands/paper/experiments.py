@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from dnet.commands.paper.cases import run_cases
+from dnet.commands.paper.generalisation import run_generalisation
 from dnet.commands.paper.goals import run_goals
 from dnet.commands.paper.grasp import run_grasp
 from dnet.commands.paper.importance import run_importance
@@ -16,4 +17,5 @@ RUN: Mapping[ExperimentName, Callable[[PaperRequest], None]] = {
     "importance": run_importance,
     "networks": run_networks,
     "goals": run_goals,
+    "generalisation": run_generalisation,
 }

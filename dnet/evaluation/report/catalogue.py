@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-ExperimentName = Literal["grasp", "cases", "importance", "networks", "goals"]
+ExperimentName = Literal["grasp", "cases", "importance", "networks", "goals", "generalisation"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,5 +50,11 @@ EXPERIMENTS: Mapping[ExperimentName, Experiment] = {
         "success over the tolerance, against baselines (of the follow-ups)",
         "episodes, as for grasp; for hu a training in --runs",
         "2 hours",
+    ),
+    "generalisation": Experiment(
+        "Other objects, cameras and clouds",
+        "stiffness, size, shape, camera noise, points (of the follow-ups)",
+        "for 512 and 1024 points trainings in --runs",
+        "40 minutes",
     ),
 }

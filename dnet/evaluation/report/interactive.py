@@ -151,10 +151,12 @@ def _space(plot: SpacePlot, objects: Any) -> Any:
     axes = {f"{axis}axis": {"title": {"text": f"{axis}, mm"}, **_AXIS} for axis in "xyz"}
     scene = {
         "aspectmode": "data",
-        "camera": {"eye": {"x": 0.4, "y": -1.6, "z": 1.1}},
+        "camera": {"eye": {"x": 0.6, "y": -2.0, "z": 1.3}},
         **axes,
     }
-    figure.update_layout(height=SPACE_HEIGHT, scene=scene, margin=dict.fromkeys("lrtb", 10))
+    figure.update_layout(
+        height=SPACE_HEIGHT, scene=scene, margin={"l": 10, "r": 10, "t": 40, "b": 10}
+    )
     return figure
 
 

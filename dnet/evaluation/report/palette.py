@@ -40,6 +40,8 @@ KNOWN: Mapping[str, Stroke] = {
     "dense": Stroke(SKY),
     "most displaced point": Stroke(SAND),
     "random point": Stroke(GREY),
+    "in distribution": Stroke(NAVY),
+    "out of distribution": Stroke(SKY),
     "start": Stroke(GREY),
     "goal": Stroke(CLAY),
     "end": Stroke(NAVY),

@@ -7,6 +7,7 @@ from typing import Protocol
 from dnet.evaluation.report.asked import Asked, read_asked
 from dnet.evaluation.report.cases_section import cases_section
 from dnet.evaluation.report.catalogue import EXPERIMENTS, ExperimentName
+from dnet.evaluation.report.generalisation_section import generalisation_section
 from dnet.evaluation.report.goals_section import goals_section
 from dnet.evaluation.report.grasp_section import grasp_section
 from dnet.evaluation.report.importance_section import importance_section
@@ -28,6 +29,7 @@ SECTIONS: Mapping[ExperimentName, Read] = {
     "importance": importance_section,
     "networks": networks_section,
     "goals": goals_section,
+    "generalisation": generalisation_section,
 }
 
 
