@@ -1,18 +1,25 @@
-"""The experiment `cases`: the four servo cases of the paper, by keypoints and by the regressor."""
+"""The experiment `cases`: the four servo cases of the paper, by each way to choose the point."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from dnet.commands.paper.goals import directories, weights_of
 from dnet.commands.paper.request import PaperRequest
-from dnet.commands.servo import Grasp, ServoOptions
+from dnet.commands.servo import Controller, Grasp, ServoOptions
 from dnet.commands.servo_batch import finish
 from dnet.evaluation.report.asked import write_asked
+from dnet.evaluation.report.cases_section import HU_TRUE_POINT
 from dnet.trials.request import Trial
 
 SEEDS = (2_000_000, 2_000_001, 2_000_002, 2_000_003)
 """Of the goals, which nothing was chosen by: the first four of a range that nothing else uses."""
-GRASPS: tuple[Grasp, ...] = ("keypoints", "regressor")
+METHODS: Mapping[str, tuple[Controller, Grasp]] = {
+    "keypoints": ("deformernet", "keypoints"),
+    "regressor": ("deformernet", "regressor"),
+    HU_TRUE_POINT: ("hu", "truth"),
+}
+"""The paper gives the controller of Hu et al. the true point."""
 
 
 def run_cases(request: PaperRequest) -> None:
@@ -24,9 +31,15 @@ def run_cases(request: PaperRequest) -> None:
     """
     folder = request.out / "cases"
     seeds = SEEDS[: request.count(len(SEEDS))]
-    options = ServoOptions(world=request.world, checkpoint=request.checkpoint, seed=request.seed)
-    trials: dict[str, list[Trial]] = {
-        grasp: _trials(grasp, seeds, options, folder) for grasp in GRASPS
+    options = ServoOptions(
+        world=request.world,
+        checkpoint=request.checkpoint,
+        hu_checkpoint=request.hu,
+        seed=request.seed,
+    )
+    trials = {
+        name: _trials(controller, grasp, seeds, folder / controller / grasp, options)
+        for name, (controller, grasp) in METHODS.items()
     }
     asked = request.asked(
         len(SEEDS),
@@ -40,10 +53,14 @@ def run_cases(request: PaperRequest) -> None:
 
 
 def _trials(
-    grasp: Grasp, seeds: tuple[int, ...], options: ServoOptions, folder: Path
+    controller: Controller,
+    grasp: Grasp,
+    seeds: tuple[int, ...],
+    folder: Path,
+    options: ServoOptions,
 ) -> list[Trial]:
-    plain = replace(options, grasp=grasp).trial("", folder, controller="deformernet")
+    plain = replace(options, grasp=grasp).trial("", folder, controller=controller)
     return [
-        replace(plain, goal=f"random:{seed}", out=folder / grasp / f"case-{number}")
+        replace(plain, goal=f"random:{seed}", out=folder / f"case-{number}")
         for number, seed in enumerate(seeds, start=1)
     ]

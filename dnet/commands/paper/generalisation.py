@@ -18,7 +18,7 @@ from dnet.laboratory import LaboratorySettings
 from dnet.perception.noise import DepthNoise
 from dnet.recording.request import RecordingRequest
 from dnet.training.run import read_config
-from dnet.trials.methods import network_points
+from dnet.trials.methods import points_of
 from dnet.trials.request import Trial
 
 GOALS, SHAPES, SEED = 20, 2, 2
@@ -104,7 +104,7 @@ def _network(condition: Condition, request: PaperRequest) -> Path | None:
     Raises:
         LookupError: If there is none.
     """
-    if network_points(request.checkpoint) == condition.points:
+    if points_of("deformernet", request.checkpoint) == condition.points:
         return request.checkpoint
     for run in request.trainings.values():
         network = read_config(run)["network"]

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dnet.commands.paper.episodes import unseen_episodes
-from dnet.commands.paper.request import PaperRequest
+from dnet.commands.paper.request import PaperRequest, hu_weights
 from dnet.commands.servo import Controller, Grasp, ServoOptions
 from dnet.commands.servo_batch import finish
 from dnet.evaluation.report.asked import write_asked
@@ -23,6 +23,8 @@ METHODS: tuple[tuple[Controller, Grasp], ...] = (
     ("deformernet", "dense"),
     ("oracle", "truth"),
     ("rrt", "truth"),
+    ("hu", "truth"),
+    ("hu-online", "truth"),
 )
 
 
@@ -41,7 +43,12 @@ def run_goals(request: PaperRequest) -> None:
         count=request.count(GOALS),
         seed=request.seed,
     )
-    options = ServoOptions(world="quasistatic", checkpoint=request.checkpoint, seed=request.seed)
+    options = ServoOptions(
+        world="quasistatic",
+        checkpoint=request.checkpoint,
+        hu_checkpoint=request.hu,
+        seed=request.seed,
+    )
     trials = {
         method_name(*method): trials_of(*method, goals=goals, folder=folder, options=options)
         for method in METHODS
@@ -91,6 +98,7 @@ def weights_of(request: PaperRequest) -> dict[str, Path]:
     own = request.checkpoint
     return {
         "deformernet": DEFORMERNET if own is None else weights_file(own),
+        "hu": hu_weights(request),
         "keypoints": KEYPOINTS,
         "regressor": REGRESSOR,
         "dense": DENSE,

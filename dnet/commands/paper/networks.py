@@ -8,26 +8,26 @@ from typing import Any
 
 from dnet.commands.index_bar import read_index
 from dnet.commands.paper.episodes import Episodes, unseen_episodes
-from dnet.commands.paper.request import PaperRequest
+from dnet.commands.paper.request import PaperRequest, hu_weights
 from dnet.commands.progress import progress
 from dnet.datasets.frame_table import FrameTable
 from dnet.evaluation.report.asked import read_asked, write_asked
 from dnet.evaluation.report.networks_section import ARCHITECTURE
 from dnet.evaluation.report.published import GRASP_CASES
-from dnet.evaluation.report.trainings import CONFIG, ERRORS, SHIPPED
+from dnet.evaluation.report.trainings import CONFIG, ERRORS, SHIPPED, SHIPPED_HU
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
-from dnet.training.checkpoints import load, weights_file, write_json
+from dnet.training.checkpoints import load, load_any, weights_file, write_json
 from dnet.training.division import divide, thinned
 from dnet.training.frames import Frames
 from dnet.training.tasks import task_of
 from dnet.weights import DEFORMERNET
 
 FRAMES = 1500
-"""Of each part, that the network that ships is judged by, evenly over its episodes."""
+"""Of each part, that the networks that ship are judged by, evenly over its episodes."""
 
 
 def run_networks(request: PaperRequest) -> None:
-    """Copy what trainings found, and judge the network that ships, unless that was done.
+    """Copy what trainings found, and judge the networks that ship, unless that was done.
 
     Raises:
         DnetError: If the episodes or a training will not do.
@@ -36,7 +36,11 @@ def run_networks(request: PaperRequest) -> None:
     episodes = unseen_episodes(request, request.count(GRASP_CASES))
     asked = request.asked(
         FRAMES,
-        weights={"deformernet": _weights(request), **_best_weights(request)},
+        weights={
+            "deformernet": _weights(request),
+            "hu": hu_weights(request),
+            **_best_weights(request),
+        },
         data={episodes.folder.name: episodes.table.fingerprint},
         options={"validation": request.validation} if request.from_mcap is not None else {},
     )
@@ -51,7 +55,11 @@ def run_networks(request: PaperRequest) -> None:
         return
     for name, run in request.trainings.items():
         _copy(run, folder / name)
-    _judge(request, episodes, folder / SHIPPED, most=max(2, asked.count))
+    for name, model, path in (
+        (SHIPPED, "deformernet", _weights(request)),
+        (SHIPPED_HU, "hu", hu_weights(request)),
+    ):
+        _judge(request, episodes, folder / name, network=(model, path), most=max(2, asked.count))
     write_json(folder / ARCHITECTURE, {"paper": _weights_of("paper"), "shipped": _weights_of()})
     write_asked(folder, asked)
 
@@ -63,23 +71,26 @@ def _copy(run: Path, folder: Path) -> None:
         write_json(folder / name, json.loads((run / name).read_text(encoding="utf-8")))
 
 
-def _judge(request: PaperRequest, episodes: Episodes, folder: Path, *, most: int) -> None:
-    """Judge the network that ships, with a progress bar."""
-    model = load(_weights(request))
+def _judge(
+    request: PaperRequest, episodes: Episodes, folder: Path, *, network: tuple[str, Path], most: int
+) -> None:
+    """Judge a network, by its kind and its file, on some of the frames, with a progress bar."""
+    kind, path = network
+    model = load_any(path)
     judged_by = task_of(model)
     errors: dict[str, Any] = {}
     with progress(request.console, "clouds") as bar:
         for part, table in _parts(request, episodes).items():
             some = thinned(table, most)
             frames = Frames.of(some, model.config)
-            task = bar.add_task(f"judging, {part}", total=2 * len(some))
+            task = bar.add_task(f"judging {kind}, {part}", total=2 * len(some))
             frames.tables.build(on_clouds=partial(bar.advance, task))
             found = judged_by.judge(model, frames, on_clouds=partial(bar.advance, task))
             if found is not None:
                 errors[part] = asdict(found)
     folder.mkdir(parents=True, exist_ok=True)
-    network = {"model": "deformernet"} | asdict(model.config)
-    write_json(folder / CONFIG, {"network": network, "training": {}})
+    told = {"model": kind} | asdict(model.config)
+    write_json(folder / CONFIG, {"network": told, "training": {}})
     write_json(folder / ERRORS, errors)
 
 

@@ -14,7 +14,9 @@ from dnet.evaluation.report.asked import Asked
 from dnet.evaluation.report.networks_section import best_of
 from dnet.evaluation.report.trainings import read_training
 from dnet.laboratory import SHAPING
+from dnet.training.checkpoints import weights_file
 from dnet.training.run import is_finished, read_config
+from dnet.weights import HU
 
 MODELS = ("deformernet", "hu")
 VERSIONS = (*SHAPING, "torch")
@@ -59,7 +61,10 @@ class PaperRequest:
 
     @cached_property
     def hu(self) -> Path | None:
-        """The network of Hu et al. to drive with: of those on the full dataset, the best one."""
+        """The network of Hu et al. to drive with: the best that is of all episodes.
+
+        None for the one that ships.
+        """
         read = {name: read_training(path) for name, path in self.trainings.items()}
         best = best_of(list(read.values()), "hu", few=False)
         return None if best is None else self.trainings[best.name]
@@ -86,6 +91,11 @@ class PaperRequest:
             options=dict(options or {}),
             runs=dict(runs or {}),
         )
+
+
+def hu_weights(request: PaperRequest) -> Path:
+    """Return the file of the network of Hu et al. that is driven with."""
+    return HU if request.hu is None else weights_file(request.hu)
 
 
 def digest(path: Path) -> str:

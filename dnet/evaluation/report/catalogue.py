@@ -31,24 +31,24 @@ EXPERIMENTS: Mapping[ExperimentName, Experiment] = {
         "Four servo cases",
         "table 2: final Chamfer distances; figures 3 to 6: results, set-up, sequences, over time",
         "nothing",
-        "8 minutes",
+        "3 minutes",
     ),
     "importance": Experiment(
         "A good and a bad manipulation point",
         "figure 2",
         "nothing",
-        "2 minutes",
+        "half a minute",
     ),
     "networks": Experiment(
         "DeformerNet against Hu et al.",
         "figure 1, and the losses on the full dataset and on a few shapes",
-        "trainings: --runs; without, the network that ships alone is judged",
+        "trainings: --runs; without, those that ship alone are judged",
         "2 minutes",
     ),
     "goals": Experiment(
         "A hundred unseen goals",
         "success over the tolerance, against baselines (of the follow-ups)",
-        "episodes, as for grasp; for hu a training in --runs",
+        "episodes, as for grasp",
         "2 hours",
     ),
     "generalisation": Experiment(

@@ -34,7 +34,7 @@ KNOWN: Mapping[str, Stroke] = {
     "rrt": Stroke(SAND),
     "hu": Stroke(CLAY),
     "hu-online": Stroke(CLAY, "dash"),
-    "hu + truth": Stroke(CLAY),
+    "hu, true point": Stroke(CLAY),
     "keypoints": Stroke(NAVY),
     "regressor": Stroke(BLUE),
     "dense": Stroke(SKY),

@@ -10,8 +10,8 @@ from dnet.errors import BadReport
 
 CONFIG, ERRORS = "config.json", "errors.json"
 """Names of a training's own files: copies of them are kept with the experiment."""
-SHIPPED = "shipped"
-"""Directory of the network that ships, whose errors the experiment finds itself."""
+SHIPPED, SHIPPED_HU = "shipped", "shipped-hu"
+"""Directories of the networks that ship, whose errors the experiment finds itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,15 @@ class Training:
 
 
 def read_trainings(folder: Path) -> list[Training]:
-    """Return the trainings whose copies are in a directory, by name; the one that ships first.
+    """Return the trainings whose copies are in a directory, by name; those that ship first.
 
     Raises:
         BadReport: If one cannot be read.
     """
     runs = sorted(path.parent for path in folder.glob(f"*/{ERRORS}"))
-    return [read_training(run) for run in sorted(runs, key=lambda run: run.name != SHIPPED)]
+    return [
+        read_training(run) for run in sorted(runs, key=lambda run: not run.name.startswith(SHIPPED))
+    ]
 
 
 def read_training(run: Path) -> Training:
