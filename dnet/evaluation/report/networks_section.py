@@ -148,6 +148,9 @@ def _losses(found: Sequence[Training], asked: Asked | None) -> list[Claim]:
             met, reason = _judged(
                 found, model, part=part, reduction=reduction, value=value, paper=paper
             )
+            if asked is not None and asked.reduced and one is not None and one.shipped:
+                few = f"judged on {asked.count} frames of {asked.full}, many of them rest shapes"
+                reason = f"{few}; {reason}"
             claims.append(
                 Claim("section III", what, f"{paper} mm²", f"{value:.2f} mm²", met, reason)
             )

@@ -46,6 +46,11 @@ class Training:
     """What sets it apart from others of its model."""
     errors: tuple[Errors, ...]
 
+    @property
+    def shipped(self) -> bool:
+        """Whether it ships: its errors are the experiment's own, on some of the frames."""
+        return self.name.startswith(SHIPPED)
+
     def error(self, part: str, pairs: str = "any two") -> Errors | None:
         """Return the errors on one set of frames and pairs, where they are known."""
         found = (one for one in self.errors if (one.part, one.pairs) == (part, pairs))
