@@ -5,6 +5,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/pip install --quiet -c constraints.txt
 TORCH := $(shell sed -n 's/^torch==//p' constraints.txt)
+# Of `make reproduce`.
+SCALE ?= 0.02
+OUT ?= reproduction
 # The CPU build of torch is 200 MB instead of several GB; a machine with an NVIDIA GPU gets CUDA's.
 TORCH_CPU_INDEX := https://download.pytorch.org/whl/cpu
 # What Open3D needs to be imported, and what Rerun needs to draw without a screen.
@@ -27,7 +30,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo test check format lint type layers benchmark build clean
+.PHONY: help setup develop libraries demo reproduce test check format lint type layers benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -48,6 +51,10 @@ $(VENV)/.run: pyproject.toml constraints.txt
 	$(INSTALL) -e .
 	@touch $@
 
+$(VENV)/.report: $(VENV)/.run
+	$(INSTALL) -e ".[report]"
+	@touch $@
+
 $(VENV)/.develop: $(VENV)/.run
 	$(INSTALL) -e ".[dev]"
 	@touch $@
@@ -59,6 +66,9 @@ libraries: ## Install the system libraries of Open3D and Rerun, or say what to r
 
 demo: setup ## Record, train, servo and play on a small scale; results in demo/
 	$(BIN)/dnet demo
+
+reproduce: setup $(VENV)/.report ## The paper from nothing, on SCALE of its work; results in OUT
+	$(BIN)/dnet reproduce --scale $(SCALE) --out $(OUT)
 
 test: develop ## Run the checks and the tests
 	$(MAKE) --no-print-directory check

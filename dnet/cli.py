@@ -13,6 +13,7 @@ from dnet.commands.export import Export
 from dnet.commands.inspect import Inspect
 from dnet.commands.play import Play
 from dnet.commands.record import Record
+from dnet.commands.reproduce import Reproduce
 from dnet.commands.servo import Servo
 from dnet.commands.train import Train
 from dnet.errors import DnetError
@@ -27,7 +28,7 @@ learn from the logs, and drive the tissue to a goal shape.
 
 `dnet COMMAND --help` teaches each."""
 
-Command = Record | Train | Servo | Play | Inspect | Evaluate | Export | Demo
+Command = Record | Train | Servo | Play | Inspect | Evaluate | Export | Reproduce | Demo
 COMMANDS: dict[str, type[Command]] = {
     "record": Record,
     "train": Train,
@@ -36,6 +37,7 @@ COMMANDS: dict[str, type[Command]] = {
     "inspect": Inspect,
     "evaluate": Evaluate,
     "export": Export,
+    "reproduce": Reproduce,
     "demo": Demo,
 }
 

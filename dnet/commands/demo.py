@@ -45,10 +45,12 @@ class Demo:
         """
         from rich.console import Console
 
-        from dnet.commands.demo_steps import Steps, held_out_goal, summary
+        from dnet.commands.demo_summary import held_out_goal, summary
+        from dnet.commands.stages import Stages
 
         console = Console()
-        steps = Steps(self.out, {**asdict(self), "out": str(self.out)}, console)
+        options = {**asdict(self), "out": str(self.out)}
+        steps = Stages(self.out / "demo.json", options, console)
         workers = min(os.cpu_count() or 1, self.pairs)
         data, train, servo = self.out / "data", self.out / "train", self.out / "servo"
         steps.run(
