@@ -695,3 +695,10 @@ class OutOfReach(DnetError, ValueError):
             f"none of {points} points of the initial cloud faces the moving arm and lies beyond "
             "the holding arm's clearance; turn the object, or choose a smaller clearance"
         )
+
+
+class NoFilm(DnetError, ValueError):
+    """A film of a kind that is not written."""
+
+    def __init__(self, path: Path, kinds: tuple[str, ...]) -> None:
+        super().__init__(f"{path} is no film; let its name end in {' or '.join(kinds)}")

@@ -11,6 +11,7 @@ from dnet.recorders.frame_columns import GRIPPER
 from dnet.recorders.link_rows import WORLD, placed
 from dnet.recorders.rerun_scene import (
     CHAMFER,
+    GOAL,
     JOINTS,
     LATENCY,
     LEGACY,
@@ -30,8 +31,12 @@ LOOK_AT = (0.005, 0.0, 0.045)
 BACKGROUND = (22, 24, 30)
 
 
-Company = Literal["alone", "several"]
-"""Whether a recording is seen by itself, or the viewer must list it with others."""
+Company = Literal["alone", "several", "film"]
+"""Whether a recording is seen by itself, the viewer must list it with others, or a film of its
+scene is taken."""
+FILM_GOAL = (214, 218, 228)
+"""Colour of the goal in a film: pale, for the object is of all colours, green among them."""
+FILM_GOAL_RADIUS = 0.0006
 
 SERVO_APPLICATION, RECORDING_APPLICATION = "dnet servo", "dnet record"
 COMPARISON_APPLICATION = "dnet servo side by side"
@@ -44,6 +49,8 @@ def servo_blueprint(*, gripper: bool = False, company: Company = "alone") -> rrb
     At right what the run is about, how far the shape is from its goal, comes first and is largest;
     then what was asked for and what was done; what only some want to know waits in tabs.
     """
+    if company == "film":
+        return _film_blueprint()
     curves: list[rrb.View | rrb.Container] = [
         _plot("Chamfer to the goal (mm), grey: its floor", CHAMFER),
         rrb.Horizontal(
@@ -67,6 +74,20 @@ def recording_blueprint(*, company: Company = "alone") -> rrb.Blueprint:
         _joints(),
     ]
     return _blueprint(curves, shares=[1] * 5, company=company)
+
+
+def _film_blueprint() -> rrb.Blueprint:
+    """Return the scene alone, without words in it: a film says them beside it."""
+    goal = rr.Points3D.from_fields(colors=FILM_GOAL, radii=FILM_GOAL_RADIUS)
+    view = _view(hidden=(f"{GOAL}/label",), overrides={GOAL: goal})
+    return rrb.Blueprint(
+        view,
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(state="hidden", timeline=TIME_TIMELINE),
+        auto_layout=False,
+        auto_views=False,
+    )
 
 
 def _plot(name: str, entity: str, *, legend: bool = False) -> rrb.TimeSeriesView:
@@ -117,12 +138,19 @@ def comparison_blueprint(titles: Mapping[str, str]) -> rrb.Blueprint:
     return _arranged(rrb.Horizontal(*columns), company="alone")
 
 
-def _view(name: str = "Scene", *, place: str = "") -> rrb.Spatial3DView:
+def _view(
+    name: str = "Scene",
+    *,
+    place: str = "",
+    hidden: Sequence[str] = (),
+    overrides: Mapping[str, rr.Points3D] | None = None,
+) -> rrb.Spatial3DView:
     shown = [f"/{place}/**", *(f"/{drawn_at(place, arm)}/**" for arm in ARMS)] if place else ["/**"]
     return rrb.Spatial3DView(
         name=name,
         origin="/",
-        contents=[*shown, *(f"- /{placed(place, entity)}/**" for entity in PLOTTED)],
+        contents=[*shown, *(f"- /{placed(place, entity)}/**" for entity in (*PLOTTED, *hidden))],
+        overrides={f"/{entity}": looks for entity, looks in (overrides or {}).items()},
         # The arms' boxes and cylinders would be wire frames.
         defaults=[
             rr.Boxes3D.from_fields(fill_mode="solid"),

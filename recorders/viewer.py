@@ -2,8 +2,10 @@
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from rerun.experimental import ViewerClient, ViewerState
 
@@ -18,6 +20,8 @@ from dnet.recorders.viewer_process import (
     free_port,
     running,
 )
+
+T = TypeVar("T")
 
 WINDOW = "1600x900"
 TRIES = 3
@@ -48,23 +52,66 @@ def draw(file: Path, picture: Path, *, seconds: float | None) -> None:
     Raises:
         NoPicture: If the viewer cannot draw on this machine.
     """
+
+    def once() -> bytes:
+        with _opened(file, WINDOW) as (client, state, started):
+            _stop_at(client, _last_time(state) if seconds is None else seconds)
+            client.run_command("ui.toggle_top_panel")
+            return _settled_picture(client, started)
+
+    content = _tried(once, picture)
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    picture.write_bytes(content)
+
+
+def draw_view(
+    file: Path,
+    times: Sequence[float],
+    *,
+    window: str,
+    on_picture: Callable[[int], None] = lambda _: None,
+) -> list[bytes]:
+    """Return the first view of `file` as PNGs, at each of `times` in seconds of simulation.
+
+    Args:
+        file: A Rerun recording.
+        times: When.
+        window: Size of the viewer that the view is in, as in "800x600".
+        on_picture: Is told how many pictures there are.
+
+    Raises:
+        NoPicture: If the viewer cannot draw on this machine.
+    """
+
+    def all_of_them() -> list[bytes]:
+        with _opened(file, window) as (client, state, started):
+            pictures: list[bytes] = []
+            for time_ in times:
+                _stop_at(client, time_)
+                pictures.append(_settled_picture(client, started, view=state.views[0].view_id))
+                on_picture(len(pictures))
+            return pictures
+
+    return _tried(all_of_them, file)
+
+
+def _tried(drawn: Callable[[], T], what: Path) -> T:
+    """Return what the viewer has drawn; try it again if the viewer fails, as it does under load."""
     why = ""
     for _ in range(TRIES):
         try:
-            content = _draw_once(file, seconds)
+            return drawn()
         except (ConnectionError, RuntimeError, TimeoutError) as error:
             why = " ".join(str(error).split())[:300]
-            continue
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        picture.write_bytes(content)
-        return
-    raise NoPicture(picture, TRIES, why)
+    raise NoPicture(what, TRIES, why)
 
 
-def _draw_once(file: Path, seconds: float | None) -> bytes:
+@contextmanager
+def _opened(file: Path, window: str) -> Iterator[tuple[ViewerClient, ViewerState, float]]:
+    """Open `file` in a viewer without a screen; yield that, what it shows, and since when."""
     port = free_port()
     headless = command("--headless", "--port", str(port), "--hide-welcome-screen")
-    headless += ["--window-size", WINDOW, str(file)]
+    headless += ["--window-size", window, str(file)]
     with tempfile.TemporaryDirectory() as directory:
         log = Path(directory) / "viewer.log"
         environment = {"XDG_RUNTIME_DIR": directory, **QUIET}
@@ -72,9 +119,7 @@ def _draw_once(file: Path, seconds: float | None) -> bytes:
             started = time.monotonic()
             try:
                 client, state = _loaded(f"rerun+http://{LOCAL}:{port}/proxy", viewer)
-                _stop_at(client, _last_time(state) if seconds is None else seconds)
-                client.run_command("ui.toggle_top_panel")
-                return _settled_picture(client, started)
+                yield client, state, started
             except (ConnectionError, RuntimeError, TimeoutError) as error:
                 if viewer.poll() is not None:
                     said = log.read_text(errors="replace").strip().splitlines()[-1:]
@@ -118,12 +163,12 @@ def _last_time(state: ViewerState) -> float | None:
     return max(ends) / 1e9 if ends else None
 
 
-def _settled_picture(client: ViewerClient, started: float) -> bytes:
+def _settled_picture(client: ViewerClient, started: float, *, view: str | None = None) -> bytes:
     """Return a picture that no longer changes, taken after the viewer's notices are gone."""
     deadline = time.monotonic() + DRAW_SECONDS
     before = b""
     while True:
-        picture = client.take_screenshot()
+        picture = client.take_screenshot(view)
         late = time.monotonic()
         if late > deadline or (late - started > NOTICE_SECONDS and picture == before):
             return picture

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class Play:
 
     Example: dnet play runs/servo --screenshot run.png
 
+    Example: dnet play runs/servo --film run.webp
+
     Example: dnet play eval/deformernet/random-7 eval/oracle/random-7
     """
 
@@ -44,6 +49,9 @@ class Play:
     """Of each directory, open so many episodes at most; the rest is said in a line."""
     screenshot: Path | None = None
     """Draw the first of them into this PNG instead of opening a window."""
+    film: Path | None = None
+    """Draw a servo run at every step, from its MCAP log alone, into this .webp or .gif, which
+    moves; a run of `dnet servo --waypoints 3` has a step every few millimetres."""
     save: Path | None = None
     """Write all of them as one Rerun recording (`.rrd`) instead of opening a window."""
     at: float | None = None
@@ -64,6 +72,9 @@ class Play:
         from dnet.recorders.playback import play
 
         console = Console(stderr=True)
+        if self.film is not None:
+            self._film(self.film, console)
+            return
         wanted = [one.strip() for some in self.episode for one in some.split(",") if one.strip()]
         beside = None if wanted or self.filter else side_by_side(self.files)
         choice = Choice(wanted, self.filter, self.limit)
@@ -79,3 +90,21 @@ class Play:
         for written in (self.screenshot, self.save):
             if written is not None:
                 print(written)
+
+    def _film(self, out: Path, console: "Console") -> None:
+        """Draw the first of the runs as a film, with a progress bar."""
+        from dnet.commands.progress import progress
+        from dnet.datasets.reader import EpisodeReader
+        from dnet.datasets.stores import as_place
+        from dnet.recorders.film import film
+
+        place = as_place(self.files[0])
+        log = place / "run.mcap" if isinstance(place, Path) and place.is_dir() else place
+        with EpisodeReader(log) as episode, progress(console, "pictures") as bar:
+            task = bar.add_task("drawing", total=None)
+            film(
+                episode,
+                out,
+                on_picture=lambda done, total: bar.update(task, completed=done, total=total),
+            )
+        print(out)

@@ -84,6 +84,10 @@ def plan(out: Path, scale: float, *, seed: int, workers: int) -> list[Stage]:
         train("dense", f"--model dense --groups 4 --epochs 6 {begun}"),
         train("hu", "--model hu --epochs 100"),
         train("hu-linear", "--model hu --no-relu --epochs 100"),
+        train(
+            "hu-few",
+            "--model hu --episodes 1 --choose-by unseen-shapes --groups 2 --epochs 150",
+        ),
         Stage(
             "grasps",
             f"dnet evaluate grasp --from-mcap {unseen} --validation 1 --cases {size.cases} "
