@@ -30,7 +30,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo reproduce test check format lint type layers benchmark build clean
+.PHONY: help setup develop libraries demo reproduce test check format lint type layers docs benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -74,7 +74,7 @@ test: develop ## Run the checks and the tests
 	$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
 
-check: lint type layers ## Run the static checks
+check: lint type layers docs ## Run the static checks
 
 format: ## Format the code
 	$(BIN)/ruff format .
@@ -91,6 +91,9 @@ type:
 layers:
 	$(BIN)/lint-imports
 
+docs: ## Build the documentation into site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
 benchmark: develop ## Measure how fast the laboratory is, as ratios
 	$(BIN)/python -m tests.benchmarks.laboratory --workers
 
@@ -98,4 +101,4 @@ build: develop ## Build the wheel and the sdist into dist/
 	$(BIN)/python -m build
 
 clean: ## Remove .venv, build products and caches
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
