@@ -125,6 +125,12 @@ def test_page_text_and_tables_tell_the_same(made: Path) -> None:
         assert f'id="table-{sheet.name}"' in page
 
 
+def test_every_picture_of_the_text_is_there_under_a_name_without_blanks(made: Path) -> None:
+    named = re.findall(r"!\[.*?\]\((.*)\)", (made / "report.md").read_text())
+    assert len(named) > 10
+    assert all((made / name).is_file() and " " not in name for name in named)
+
+
 def test_the_page_needs_nothing_else(made: Path) -> None:
     page = (made / "report.html").read_text()
     outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)

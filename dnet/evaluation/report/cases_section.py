@@ -241,7 +241,8 @@ def _stills(stories: Mapping[str, Sequence[Story | None]]) -> tuple[Still, ...]:
             "and its Chamfer distance; the goal as sparse red points."
         )
         png = draw_sequence(story.shots, story.goal, distances)
-        stills.append(Still(f"cases-sequence-{number}-{method}", caption, png))
+        name = method.replace(",", "").replace(" ", "-")
+        stills.append(Still(f"cases-sequence-{number}-{name}", caption, png))
     return tuple(stills)
 
 

@@ -49,7 +49,7 @@ EXPERIMENTS: Mapping[ExperimentName, Experiment] = {
         "A hundred unseen goals",
         "success over the tolerance, against baselines (of the follow-ups)",
         "episodes, as for grasp",
-        "2 hours",
+        "20 minutes",
     ),
     "generalisation": Experiment(
         "Other objects, cameras and clouds",
