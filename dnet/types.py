@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from jaxtyping import Float32, Float64, UInt8
+from jaxtyping import Float, Float32, Float64, UInt8
 
 Cloud = Float32[np.ndarray, "_ 3"]
 Nodes = Float32[np.ndarray, "_ 3"]
@@ -169,6 +169,18 @@ class Goal:
 PlanStatus = Literal["straight", "rrt_connect", "partial", "failed"]
 """`straight`: the straight line of the tip; `rrt_connect`: a planned detour that reaches the
 request; `partial`: a shorter motion than requested; `failed`: no motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeypointPairs:
+    """Keypoints of an object in two clouds; row k of both is the same point of it."""
+
+    initial: Float[np.ndarray, "k 3"]
+    """In metres."""
+    goal: Float[np.ndarray, "k 3"]
+    """In metres."""
+    weights: Float[np.ndarray, " k"]
+    """How much each counts for the choice of a grasp; 0 for most."""
 
 
 @dataclass(frozen=True, slots=True)

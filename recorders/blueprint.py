@@ -7,6 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TextLogColumnKind
 
+from dnet.recorders.choice import CHOICE
 from dnet.recorders.frame_columns import GRIPPER
 from dnet.recorders.link_rows import WORLD, placed
 from dnet.recorders.rerun_scene import (
@@ -23,8 +24,8 @@ from dnet.recorders.rerun_scene import (
 )
 from dnet.types import ARMS
 
-PLOTTED = (JOINTS, GRIPPER, LOG, CHAMFER, NODES, LEGACY, MOTION_LENGTH, LATENCY)
-"""What has no place in the scene."""
+PLOTTED = (CHOICE, JOINTS, GRIPPER, LOG, CHAMFER, NODES, LEGACY, MOTION_LENGTH, LATENCY)
+"""What has no place in the scene, but views of its own."""
 EYE = (0.045, -0.275, 0.155)
 """From the front and a little above, as the depth camera stands: the object fills the view."""
 LOOK_AT = (0.005, 0.0, 0.045)
@@ -43,8 +44,12 @@ COMPARISON_APPLICATION = "dnet servo side by side"
 """Rerun shows all recordings of one application in one layout."""
 
 
-def servo_blueprint(*, gripper: bool = False, company: Company = "alone") -> rrb.Blueprint:
-    """Return the layout of a servo run, with the curves of the gripper if they are logged.
+def servo_blueprint(
+    *, gripper: bool = False, choice: bool = False, company: Company = "alone"
+) -> rrb.Blueprint:
+    """Return the layout of a servo run.
+
+    With the curves of the gripper, and with where the object is grasped, if they are logged.
 
     At right what the run is about, how far the shape is from its goal, comes first and is largest;
     then what was asked for and what was done; what only some want to know waits in tabs.
@@ -62,7 +67,10 @@ def servo_blueprint(*, gripper: bool = False, company: Company = "alone") -> rrb
             _joints(),
         ),
     ]
-    return _blueprint(curves, shares=[3, 2, 2, 3], company=company)
+    scene: rrb.View | rrb.Container = _view()
+    if choice:
+        scene = rrb.Tabs(_view(), _choice(), active_tab=0)
+    return _blueprint(curves, scene=scene, shares=[3, 2, 2, 3], company=company)
 
 
 def recording_blueprint(*, company: Company = "alone") -> rrb.Blueprint:
@@ -73,7 +81,7 @@ def recording_blueprint(*, company: Company = "alone") -> rrb.Blueprint:
         _gripper(),
         _joints(),
     ]
-    return _blueprint(curves, shares=[1] * 5, company=company)
+    return _blueprint(curves, scene=_view(), shares=[1] * 5, company=company)
 
 
 def _film_blueprint() -> rrb.Blueprint:
@@ -107,11 +115,15 @@ def _joints() -> rrb.TimeSeriesView:
 
 
 def _blueprint(
-    curves: Sequence[rrb.View | rrb.Container], *, shares: Sequence[int], company: Company
+    curves: Sequence[rrb.View | rrb.Container],
+    *,
+    scene: rrb.View | rrb.Container,
+    shares: Sequence[int],
+    company: Company,
 ) -> rrb.Blueprint:
     return _arranged(
         rrb.Horizontal(
-            _view(),
+            scene,
             rrb.Vertical(*curves, _log(), row_shares=list(shares)),
             column_shares=[5, 3],
         ),
@@ -159,12 +171,25 @@ def _view(
         background=BACKGROUND,
         line_grid=False,
         spatial_information=rrb.SpatialInformation(target_frame=WORLD),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=EYE,
-            look_target=LOOK_AT,
-            eye_up=(0.0, 0.0, 1.0),
-        ),
+        eye_controls=_eye(),
+    )
+
+
+def _choice() -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        name="Where to grasp",
+        origin="/",
+        contents=[f"/{CHOICE}/**"],
+        background=BACKGROUND,
+        line_grid=False,
+        spatial_information=rrb.SpatialInformation(target_frame=WORLD),
+        eye_controls=_eye(),
+    )
+
+
+def _eye() -> rrb.EyeControls3D:
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=EYE, look_target=LOOK_AT, eye_up=(0.0, 0.0, 1.0)
     )
 
 

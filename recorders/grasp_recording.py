@@ -8,13 +8,13 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import Float
-from matplotlib import colormaps
 
 from dnet.recorders.blueprint import BACKGROUND
+from dnet.recorders.choice import RADIUS, cloud_points, log_keypoint_pairs
 from dnet.recorders.recording_file import recording_file
-from dnet.recorders.rerun_scene import CURRENT_COLOR, GOAL_COLOR, POINT_RADIUS
+from dnet.recorders.rerun_scene import GOAL_COLOR, POINT_RADIUS
 from dnet.recorders.training_layout import EYE, LOOK_AT
-from dnet.types import Cloud, Point
+from dnet.types import Cloud, KeypointPairs, Point
 
 GRASP_APPLICATION = "dnet evaluate grasp"
 CASES = "case"
@@ -22,19 +22,6 @@ CASES = "case"
 TRUE_COLOR = (60, 220, 90)
 CHOICE_COLORS = ((70, 120, 255), (255, 176, 0), (214, 110, 255), (0, 206, 209), (255, 116, 116))
 """Of the methods, in their order; a sixth has the first colour again."""
-RADIUS = 0.0028
-
-
-@dataclass(frozen=True, slots=True)
-class KeypointPairs:
-    """Keypoints of an object in two clouds; row k of both is the same point of it."""
-
-    initial: Float[np.ndarray, "k 3"]
-    """In metres."""
-    goal: Float[np.ndarray, "k 3"]
-    """In metres."""
-    weights: Float[np.ndarray, " k"]
-    """How much each counts for the choice; 0 for most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +56,9 @@ def write_grasps(path: Path, cases: Sequence[GraspCase]) -> None:
 
 
 def _log_case(recording: rr.RecordingStream, case: GraspCase) -> None:
-    colors = CURRENT_COLOR if case.heat is None else _heat_colors(case.heat)
-    recording.log("initial/cloud", _points(case.initial, colors))
-    recording.log("goal/cloud", _points(case.goal, GOAL_COLOR))
+    recording.log("initial/cloud", cloud_points(case.initial, case.heat))
+    goal = np.require(case.goal, dtype=np.float32, requirements=["C", "ALIGNED"])
+    recording.log("goal/cloud", rr.Points3D(goal, colors=GOAL_COLOR, radii=POINT_RADIUS))
     points = dict(case.choices)
     if case.truth is not None:
         points["truth"] = case.truth
@@ -89,37 +76,7 @@ def _log_case(recording: rr.RecordingStream, case: GraspCase) -> None:
     text = rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
     recording.log("about", text)
     if case.keypoints is not None:
-        _log_keypoints(recording, case.keypoints)
-
-
-def _log_keypoints(recording: rr.RecordingStream, pairs: KeypointPairs) -> None:
-    """Log keypoints in both clouds, lines between matching ones, and those that count."""
-    moved = np.linalg.norm(pairs.goal - pairs.initial, axis=1)
-    colors = _heat_colors(moved)
-    labels = [str(number) for number in range(len(moved))]
-    for entity, places in (("initial", pairs.initial), ("goal", pairs.goal)):
-        recording.log(
-            f"keypoints/{entity}",
-            rr.Points3D(places, colors=colors, radii=0.0012, labels=labels, show_labels=False),
-        )
-    strips = np.stack([pairs.initial, pairs.goal], axis=1)
-    recording.log("keypoints/lines", rr.LineStrips3D(strips, colors=colors, radii=0.0003))
-    chosen = pairs.weights > 0
-    sizes = 0.001 + 0.002 * pairs.weights[chosen] / pairs.weights.max()
-    marked = rr.Points3D(pairs.initial[chosen], colors=TRUE_COLOR, radii=sizes)
-    recording.log("keypoints/chosen", marked)
-
-
-def _points(cloud: Cloud, colors: object) -> rr.Points3D:
-    points = np.require(cloud, dtype=np.float32, requirements=["C", "ALIGNED"])
-    return rr.Points3D(points, colors=colors, radii=POINT_RADIUS)  # type: ignore[arg-type]
-
-
-def _heat_colors(values: Float[np.ndarray, " n"]) -> np.ndarray:
-    """Return a colour for each value, the brightest for the greatest."""
-    top = values.max(initial=0.0)
-    shares = values / top if top > 0 else values
-    return (255 * colormaps["inferno"](0.25 + 0.75 * shares)[:, :3]).astype(np.uint8)
+        log_keypoint_pairs(recording, case.keypoints, "keypoints")
 
 
 def _layout(*, keypoints: bool) -> rrb.Blueprint:

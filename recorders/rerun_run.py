@@ -11,11 +11,12 @@ from jaxtyping import Float64
 from dnet.errors import OccupiedOutput
 from dnet.recorders.arms import MovingArms
 from dnet.recorders.blueprint import SERVO_APPLICATION, servo_blueprint
+from dnet.recorders.choice import log_choice
 from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.rerun_scene import CHAMFER, RerunScene
 from dnet.recorders.run_sinks import OpenView, RunSinks
 from dnet.recorders.step_text import describe_step
-from dnet.types import Cloud, Frame, Goal, JointPath, Joints, Step
+from dnet.types import Cloud, Frame, Goal, JointPath, Joints, KeypointPairs, Point, Step
 
 
 class RerunRun:
@@ -56,7 +57,7 @@ class RerunRun:
         self._step: int | None = None
         self._recording = rr.RecordingStream(SERVO_APPLICATION)
         self._sinks = RunSinks(
-            self._recording, self.part, blueprint=servo_blueprint(), view=view, say=say
+            self._recording, self.part, blueprint=servo_blueprint(choice=True), view=view, say=say
         )
         self._recording.send_recording_name(name)
         self._scene = RerunScene(self._recording, urdf=urdf, counter="step")
@@ -87,6 +88,20 @@ class RerunRun:
         """Log the shape to reach, and what is known of it, for all times."""
         self.log_goal(goal.cloud)
         self._distance = GoalDistance(goal)
+
+    def log_choice(
+        self,
+        initial: Cloud,
+        point: Point,
+        *,
+        heat: Float64[np.ndarray, " n"] | None,
+        keypoints: KeypointPairs | None,
+        time: float,
+    ) -> None:
+        """Log where the object is grasped, and what that was chosen by, as `log_choice` does."""
+        self._scene.set_time(time)
+        log_choice(self._recording, initial, point, heat=heat, keypoints=keypoints)
+        self._sinks.flush()
 
     def log_latency(self, index: int, step: Step) -> None:
         """Log how long the stages of a step took, at its time."""

@@ -123,33 +123,20 @@ class Grasp:
             part.write_text(text, encoding="utf-8")
             part.replace(out / name)
         draw_cases(cases, answers, out / "grasp.png")
-        heuristic = self._heuristic()
-        views = [self._view(number, case, answers, heuristic) for number, case in enumerate(cases)]
+        views = [self._view(number, case, answers) for number, case in enumerate(cases)]
         write_grasps(out / "grasp.rrd", views)
 
-    def _view(
-        self,
-        number: int,
-        case: "Case",
-        answers: "dict[str, Answers]",
-        heuristic: "DisplacementHeuristic",
-    ) -> "GraspCase":
-        from dnet.errors import NoDisplacement
-        from dnet.recorders.grasp_recording import GraspCase, KeypointPairs
+    @staticmethod
+    def _view(number: int, case: "Case", answers: "dict[str, Answers]") -> "GraspCase":
+        from dnet.recorders.grasp_recording import GraspCase
 
-        choice = answers["dense"].choices[number]
-        try:
-            found = heuristic.choose(case.initial, case.goal)
-        except NoDisplacement:
-            pairs = None
-        else:
-            pairs = KeypointPairs(found.keypoints.initial, found.keypoints.goal, found.weights)
+        dense, pairs = (answers[name].choices[number] for name in ("dense", "keypoints"))
         return GraspCase(
             case.name,
             case.initial,
             case.goal,
             {name: found.points[number] for name, found in answers.items()},
             case.truth,
-            None if choice is None else choice.scores,
-            pairs,
+            None if dense is None else dense.scores,
+            None if pairs is None else pairs.keypoints,
         )

@@ -14,7 +14,7 @@ from dnet.nets.keypoints import Keypoints
 from dnet.servo.pickers import Choice
 from dnet.servo.reach import reachable, reachable_hidden_sides
 from dnet.sim.scenes import Workspace
-from dnet.types import Cloud, Point
+from dnet.types import Cloud, KeypointPairs, Point
 
 MOST, POWER = 100, 20
 """Chosen on 60 episodes that networks had learned from, which of keypoints, that learn from clouds
@@ -90,7 +90,9 @@ class DisplacementHeuristic:
     def pick(self, initial: Cloud, goal: Cloud) -> Choice:
         """Return the point of `choose` and how sure it is; raise as that does."""
         chosen = self.choose(initial, goal)
-        return Choice(chosen.point, chosen.confidence)
+        found = chosen.keypoints
+        pairs = KeypointPairs(found.initial, found.goal, chosen.weights)
+        return Choice(chosen.point, chosen.confidence, keypoints=pairs)
 
     def choose_by(self, keypoints: Keypoints, initial: Cloud, goal: Cloud) -> KeypointChoice:
         """Return where to grasp by keypoints that are known already; raise as `choose` does."""

@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
-from dnet.types import Cloud, Point
+from dnet.types import Cloud, KeypointPairs, Point
 
 APART = 0.015
 """A point this near to one that was tried before is the same grasp, in metres: the jaws' reach."""
@@ -26,6 +26,8 @@ class Choice:
     """From 0 to 1."""
     scores: Float64[np.ndarray, "_"] | None = None
     """How good each point of the initial cloud would be, the best highest, (n,)."""
+    keypoints: KeypointPairs | None = None
+    """What it was chosen by, if by keypoints."""
 
 
 @runtime_checkable

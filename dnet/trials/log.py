@@ -19,9 +19,10 @@ from dnet.recorders.rerun_run import RerunRun
 from dnet.recorders.run_sinks import OpenView
 from dnet.recorders.step_text import describe_latency, describe_step
 from dnet.servo.grasping import Motion
+from dnet.servo.pickers import Choice
 from dnet.sim.urdf import psm_urdf
 from dnet.trials.request import LATENCY, RECORDING, RUN
-from dnet.types import ARMS, EpisodeMeta, Goal, Joints, Plan, Step, Trace
+from dnet.types import ARMS, Cloud, EpisodeMeta, Goal, Joints, Plan, Point, Step, Trace
 
 PICTURES = 10
 """Of the moving arm in a Rerun recording, a second of simulation."""
@@ -114,6 +115,13 @@ class TrialLog:
         if self._recording is not None:
             self._recording.log_target(goal)
         self.moved(motions)
+
+    def chosen(self, initial: Cloud, choice: Choice, point: Point, *, time: float) -> None:
+        """Write where the object is grasped, what it looked like before, and why there."""
+        if self._recording is not None:
+            self._recording.log_choice(
+                initial, point, heat=choice.scores, keypoints=choice.keypoints, time=time
+            )
 
     def moved(self, motions: Sequence[Motion]) -> None:
         """Write motions of the arm outside of the loop."""

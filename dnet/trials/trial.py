@@ -18,7 +18,7 @@ from dnet.servo.controllers import Controller
 from dnet.servo.grasping import Hand
 from dnet.servo.held_end import LIMIT, held_end_apart
 from dnet.servo.loop import Surroundings, servo
-from dnet.servo.pickers import Picker, candidates
+from dnet.servo.pickers import Choice, Picker, candidates
 from dnet.sim.grasp import at
 from dnet.trials.eyes import Eyes
 from dnet.trials.goals import Task, read_task
@@ -70,6 +70,7 @@ def run_trial(
         ) as log:
             log.start(task.goal, grasping.hand.motions)
             grasping.tell = log
+            grasping.tell_choice()
             if grasping.apart > LIMIT:
                 log.warn(_another_object(grasping.apart), time=lab.world.time)
             trace = servo(
@@ -107,6 +108,8 @@ class _Grasping:
         """Every point of the object at rest at which it was grasped, in order."""
         self.apart = 0.0
         """How far the goal is from the object where the other arm holds it, in metres."""
+        self._chosen: tuple[Cloud, Choice, float] | None = None
+        """What was seen, what was chosen, and when."""
 
     def begin(self) -> Point:
         """Set the object down, look at it, and grasp it where the picker says.
@@ -128,19 +131,27 @@ class _Grasping:
         why = self._grasp()
         self.tell.moved(self.hand.motions[known:])
         if not why:
+            self.tell_choice()
             where = np.round(self.points[-1], 4).tolist()
             self.tell.note(f"grasped again, at {where} m", time=self._lab.world.time)
         return why
 
+    def tell_choice(self) -> None:
+        """Write down where the object was grasped last, and why there."""
+        if self._chosen is not None:
+            initial, choice, time = self._chosen
+            self.tell.chosen(initial, choice, self.points[-1], time=time)
+
     def _grasp(self) -> str:
         self.hand.let_go()
-        initial = self._initial()
+        initial, time = self._initial(), self._lab.world.time
         self.apart = held_end_apart(initial, self._task.goal.cloud, self._task.scene.hold)
         choice = self._picker.pick(initial, self._task.goal.cloud)
         point, why = self.hand.grasp(list(candidates(choice, initial, self.points)))
         if point is None:
             return why
         self.points.append(point)
+        self._chosen = initial, choice, time
         return ""
 
     def _initial(self) -> Cloud:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 from rerun.chunk import RrdReader
 
 
@@ -21,8 +22,9 @@ def rows(path: Path, entity: str, component: str, *, timeline: str | None) -> li
         if timeline is None:
             found += [(None, value) for value in values if chunk.is_static]
         elif timeline in names:
-            times = batch.column(timeline).to_pylist()
-            found += zip(map(_plain, times), values, strict=True)
+            times = batch.column(timeline).cast(pa.int64()).to_pylist()
+            unit = 1e9 if timeline == "sim_time" else 1
+            found += [(time / unit, value) for time, value in zip(times, values, strict=True)]
     return found if timeline is None else sorted(found, key=lambda row: row[0])
 
 
@@ -39,7 +41,3 @@ def link_rows(
 def entities(path: Path) -> set[str]:
     """Return the paths of all entities."""
     return {str(chunk.entity_path) for chunk in RrdReader(path).stream().to_chunks()}
-
-
-def _plain(time: Any) -> float:
-    return float(time.total_seconds()) if hasattr(time, "total_seconds") else float(time)

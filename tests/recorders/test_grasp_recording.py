@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dnet.recorders.grasp_recording import GraspCase, KeypointPairs, write_grasps
+from dnet.recorders.grasp_recording import GraspCase, write_grasps
 from dnet.recorders.viewer import draw
 from dnet.recorders.viewer_process import RERUN
+from dnet.types import KeypointPairs
 from tests.recorders.rollout import frames
 from tests.recorders.rrd import entities, rows
 

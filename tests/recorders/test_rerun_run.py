@@ -1,6 +1,7 @@
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from dnet.errors import OccupiedOutput
 from dnet.recorders.rerun_run import RerunRun
 from dnet.recorders.viewer_process import RERUN
 from dnet.sim.urdf import psm_urdf
-from dnet.types import Goal, Latency
+from dnet.types import Goal, KeypointPairs, Latency
 from tests.recorders.rollout import ARMS, GRASP, frames, step
 from tests.recorders.rrd import entities, link_rows, rows
 
@@ -64,6 +65,30 @@ def test_each_step_has_its_cloud_on_both_timelines(recording: Path) -> None:
 def test_the_goal_is_there_at_all_times(recording: Path) -> None:
     ((_, points),) = rows(recording, "/cloud/goal", "Points3D:positions", timeline=None)
     np.testing.assert_array_equal(points, frames(2)[-1].cloud)
+
+
+def test_where_a_run_grasps_is_shown_with_what_it_was_chosen_by(tmp_path: Path) -> None:
+    rest, *_, goal = frames(3, points=300)
+    pairs = KeypointPairs(rest.cloud[:20], goal.cloud[:20], np.eye(20)[3])
+    with start(tmp_path / "run.rrd") as run:
+        run.log_choice(rest.cloud, GRASP, heat=None, keypoints=pairs, time=0.0)
+        heat = np.linspace(0.0, 1.0, len(rest.cloud))
+        run.log_choice(rest.cloud, GRASP + 0.01, heat=heat, keypoints=None, time=1.0)
+
+    def shown(entity: str, component: str) -> list[tuple[Any, Any]]:
+        return rows(tmp_path / "run.rrd", f"/choice/{entity}", component, timeline="sim_time")
+
+    points = shown("point", "Points3D:positions")
+    np.testing.assert_allclose([point for _, (point,) in points], [GRASP, GRASP + 0.01], atol=1e-6)
+    (lines,) = shown("keypoints/lines", "LineStrips3D:strips")
+    np.testing.assert_allclose(lines[1][5], [rest.cloud[5], goal.cloud[5]])
+    (chosen,) = shown("keypoints/chosen", "Points3D:positions")
+    np.testing.assert_allclose(chosen[1], [rest.cloud[3]])
+    plain, hot = (colors for _, colors in shown("cloud", "Points3D:colors"))
+    assert len(np.unique(plain)) == 1
+    assert len(np.unique(hot)) > 100
+    # The second choice has no keypoints: those of the first are taken away.
+    assert [time for time, _ in shown("keypoints", "Clear:is_recursive")] == [0.0, 1.0]
 
 
 def test_curves_are_in_millimetres(recording: Path) -> None:

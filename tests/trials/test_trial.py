@@ -85,6 +85,10 @@ def check_whole(out: Path, trace: Trace, lab: Laboratory, outcome: Outcome) -> N
 def test_the_oracle_reaches_what_was_drawn(lab: Laboratory, tmp_path: Path) -> None:
     trace = run_trial(trial(tmp_path, recording=True), lab, say=silent)
     check_whole(tmp_path, trace, lab, "converged")
+    ((_, (chosen,)),) = rows(
+        tmp_path / "run.rrd", "/choice/point", "Points3D:positions", timeline="sim_time"
+    )
+    assert np.linalg.norm(chosen - trace.steps[0].frame.grasp) < 0.01
     assert trace.steps[0].chamfer > 3e-3
     assert trace.steps[-1].chamfer < 1e-3
     with EpisodeReader(tmp_path / "run.mcap") as run:
