@@ -33,7 +33,7 @@ class KeypointChoice:
     """A manipulation point, and what it was chosen by."""
 
     point: Point
-    """Where to grasp: a point of the initial cloud, in metres."""
+    """Where to grasp: a point of the initial cloud or of a side that is not seen, in metres."""
     keypoints: Keypoints
     """The object's keypoints in both clouds; after those that were found, those of its hidden
     sides."""
@@ -81,7 +81,7 @@ class DisplacementHeuristic:
 
         Raises:
             NoDisplacement: If hardly anything moves.
-            OutOfReach: If no point of the initial cloud can be reached.
+            OutOfReach: If no point of the surface can be reached.
             ShortCloud: If a cloud has too few points.
             BadCloud: If a coordinate is NaN or infinite.
         """
