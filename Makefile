@@ -30,7 +30,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo reproduce test check format lint type layers docs benchmark build clean
+.PHONY: help setup develop libraries demo reproduce test slow check format lint type layers docs benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -73,6 +73,9 @@ reproduce: setup $(VENV)/.report ## The paper from nothing, on SCALE of its work
 test: develop ## Run the checks and the tests
 	$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
+
+slow: develop ## Run the tests that take minutes each, which `make test` leaves out
+	$(BIN)/python -m pytest -m slow
 
 check: lint type layers docs ## Run the static checks
 
