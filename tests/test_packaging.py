@@ -1,7 +1,8 @@
-"""What is installed is dnet and nothing else, with its typing marker and its linked folders."""
+"""What is installed is dnet and nothing else: from a clone, and from the sdist of one."""
 
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -11,14 +12,20 @@ ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
-def names(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    out = tmp_path_factory.mktemp("wheel")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a directory with an sdist, and with the wheel that was made of it alone."""
+    out = tmp_path_factory.mktemp("built")
     subprocess.run(
-        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", out, ROOT],
+        [sys.executable, "-m", "build", "--no-isolation", "--outdir", out, ROOT],
         check=True,
         capture_output=True,
     )
-    (wheel,) = out.glob("*.whl")
+    return out
+
+
+@pytest.fixture(scope="module")
+def names(built: Path) -> list[str]:
+    (wheel,) = built.glob("*.whl")
     return zipfile.ZipFile(wheel).namelist()
 
 
@@ -27,7 +34,8 @@ def test_the_wheel_holds_only_dnet(names: list[str]) -> None:
     assert top == {"dnet"}
 
 
-def test_the_wheel_holds_every_module_of_the_tree(names: list[str]) -> None:
+def test_the_wheel_holds_every_file_of_the_tree(names: list[str]) -> None:
+    """Modules, weights and their cards, the template of the report, the typing marker."""
     inside = {
         f"dnet/{folder}{path.relative_to(base)}"
         for folder, base in (
@@ -36,12 +44,21 @@ def test_the_wheel_holds_every_module_of_the_tree(names: list[str]) -> None:
             ("datasets/", ROOT / "datasets"),
             ("tools/", ROOT / "tools"),
         )
-        for path in base.rglob("*.py")
+        for path in base.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
     }
-    assert inside <= set(names)
-    assert "dnet/py.typed" in names
-    assert "dnet/evaluation/report/page.html.j2" in names
+    assert inside == {name for name in names if ".dist-info/" not in name}
+    assert {"dnet/py.typed", "dnet/evaluation/report/page.html.j2"} < inside
     assert not [name for name in names if "test" in name.lower()]
+
+
+def test_the_sdist_holds_no_part_of_the_tests(built: Path) -> None:
+    """They need data beside them; whoever tests has a clone."""
+    (sdist,) = built.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"constraints.txt", "CHANGELOG.md", "LICENSE", "README.md"} < inside
+    assert not [name for name in inside if name.startswith("tests/")]
 
 
 def test_the_linked_folders_are_relative_links() -> None:
