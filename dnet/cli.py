@@ -17,6 +17,7 @@ from dnet.commands.reproduce import Reproduce
 from dnet.commands.servo import Servo
 from dnet.commands.train import Train
 from dnet.errors import DnetError
+from dnet.packages import needed_for
 
 DESCRIPTION = """An open DeformerNet: simulate a da Vinci robot that deforms soft tissue, log it,
 learn from the logs, and drive the tissue to a goal shape.
@@ -65,8 +66,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Exits with 0; with 1 and one line on stderr where dnet refuses; with 2 for arguments that it
     cannot read; with 130 after Ctrl-C.
     """
+    given = sys.argv[1:] if arguments is None else arguments
     try:
-        parse(sys.argv[1:] if arguments is None else arguments).run()
+        with needed_for(" ".join(["dnet", *given[:1]])):
+            parse(given).run()
     except DnetError as error:
         sys.exit(f"dnet: {_printable(str(error))}")
     except KeyboardInterrupt:

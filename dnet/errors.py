@@ -344,12 +344,19 @@ class BadReport(DnetError, ValueError):
         super().__init__(f"{path} {why}; {way_out}")
 
 
+class MissingPackage(DnetError, ImportError):
+    """A package that every whole installation has, and this one has not."""
+
+    def __init__(self, package: str, what: str, remedy: str) -> None:
+        super().__init__(f"{what} needs {package}, which is not installed; {remedy}")
+
+
 class MissingExtra(DnetError, ImportError):
     """A package that only some need, and that is not installed."""
 
     def __init__(self, package: str, extra: str, what: str) -> None:
         super().__init__(
-            f"{what} needs {package}, which is not installed; pip install deformernet[{extra}]"
+            f'{what} needs {package}, which is not installed; pip install "deformernet[{extra}]"'
         )
 
 

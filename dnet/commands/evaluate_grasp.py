@@ -61,7 +61,10 @@ class Grasp:
 
         from dnet.commands.progress import progress
         from dnet.evaluation.grasp import answers_of, table_of
+        from dnet.packages import require
 
+        if self.out is not None:
+            require("rerun", f"{self.out / 'grasp.rrd'}")  # now, and not when all is judged
         console = Console(stderr=True)
         cases = self._cases(console)
         pickers = self._pickers()

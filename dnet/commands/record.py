@@ -29,7 +29,7 @@ class Record:
 
     out: Annotated[tyro.conf.Positional[str | Path], tyro.conf.arg(metavar="DIRECTORY|URL")]
     """Directory for the episodes, made if need be, or a URL that fsspec can write to, such as
-    s3://bucket/data (pip install deformernet[s3])."""
+    s3://bucket/data (pip install "deformernet[s3]")."""
     pairs: int = 4
     """Pairs of initial configuration and manipulation point; one episode each (paper: 150)."""
     shapes: int = 20
@@ -39,7 +39,7 @@ class Record:
     workers: int = 1
     """Processes to record on; as many as there are cores is fastest."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="HOST:PORT|auto|local")] = None
-    """Record on all processors of a Ray cluster instead (pip install deformernet[ray]): that at
+    """Record on all processors of a Ray cluster instead (pip install "deformernet[ray]"): that at
     HOST:PORT, that of this machine (auto), or one for this recording alone (local). Its nodes need
     the same dnet, and OUT must be a URL or a directory that all of them share."""
     tissue: Annotated[

@@ -26,7 +26,7 @@ class Reproduce:
 
     OUT/report/report.html tells every figure of the paper beside ours, OUT/grasps how near the
     networks come that choose where to grasp; the report servoes with those that ship
-    (pip install deformernet[report]).
+    (pip install "deformernet[report]").
 
     The command of each stage is shown, and can be run by hand. Stopped or killed, the same call
     goes on: with the stage under way where that can be gone on with, and with the next one

@@ -116,7 +116,7 @@ class Train:
     workers: int = 0
     """Processes that read ahead; none is fastest on a CPU. The order is the same with any."""
     tensorboard: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Also write RUN/tensorboard (pip install deformernet[tensorboard])."""
+    """Also write RUN/tensorboard (pip install "deformernet[tensorboard]")."""
 
     def run(self) -> None:
         """Train, with a progress bar, and print the errors.
@@ -339,6 +339,8 @@ class Train:
         run: "RunWriter",
         console: "Console",
     ) -> None:
+        from functools import partial
+
         from dnet.commands.stopping import stopping
         from dnet.commands.training_log import TrainingLog
         from dnet.commands.training_screen import TrainingBar
@@ -351,7 +353,9 @@ class Train:
             Frames.of(thinned(table, WATCHED), config, samplings=samplings)
             for table in (division.unseen_shapes, division.unseen_episodes)
         )
-        log = TrainingLog(run, board=self.tensorboard and training.process.first)
+        board = self.tensorboard and training.process.first
+        say = partial(console.print, markup=False, highlight=False, soft_wrap=True)
+        log = TrainingLog(run, board=board, say=say)
         with TrainingBar(console, epochs=self.epochs) as bar, stopping(training.stop), log:
             fit(
                 training,

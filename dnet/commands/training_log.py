@@ -1,12 +1,12 @@
 """How a training goes, for people who look: a Rerun file, and TensorBoard if they like."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from dnet.errors import MissingExtra
-from dnet.recorders.training_recording import write_training
+from dnet.errors import MissingExtra, MissingPackage
+from dnet.packages import needed_for
 from dnet.recorders.training_values import (
     EpochPoint,
     LossPoint,
@@ -29,16 +29,20 @@ SETS = {"unseen shapes": "unseen_shapes", "unseen episodes": "unseen_episodes"}
 class TrainingLog:
     """Writes RUN/training.rrd anew after every epoch, and adds to RUN/tensorboard.
 
+    A machine for training alone may do without Rerun: there is no recording then.
+
     Args:
         run: Of the training.
         board: Whether TensorBoard is wanted.
+        say: Shows a line to people.
 
     Raises:
         MissingExtra: If it is, and is not installed.
     """
 
-    def __init__(self, run: RunWriter, *, board: bool) -> None:
+    def __init__(self, run: RunWriter, *, board: bool, say: Callable[[str], None]) -> None:
         self._run = run
+        self._draw = _with_rerun(say)
         self._board = _open_board(run.path / BOARD, run.history) if board else None
 
     def __enter__(self) -> "TrainingLog":
@@ -55,17 +59,30 @@ class TrainingLog:
 
     def add(self, showcases: Mapping[str, Showcase]) -> None:
         """Take note of the last epoch of the run's history, and of pairs that it was judged by."""
-        write_training(
-            self._run.path / RECORDING,
-            name=self._run.path.name,
-            losses=[point for line in _steps(self._run.history) for point in _losses(*line)],
-            rates=[RatePoint(line["steps"], line["learning_rate"]) for line in self._run.history],
-            epochs=[EpochPoint(line["steps"], _errors(line)) for line in self._run.history],
-            motions=[_motions(name, showcase) for name, showcase in showcases.items()],
-            worst=_worst(showcases["unseen episodes"]),
-        )
+        history = self._run.history
+        if self._draw is not None:
+            self._draw(
+                self._run.path / RECORDING,
+                name=self._run.path.name,
+                losses=[point for line in _steps(history) for point in _losses(*line)],
+                rates=[RatePoint(line["steps"], line["learning_rate"]) for line in history],
+                epochs=[EpochPoint(line["steps"], _errors(line)) for line in history],
+                motions=[_motions(name, showcase) for name, showcase in showcases.items()],
+                worst=_worst(showcases["unseen episodes"]),
+            )
         if self._board is not None:
-            _add_scalars(self._board, self._run.history[-1])
+            _add_scalars(self._board, history[-1])
+
+
+def _with_rerun(say: Callable[[str], None]) -> "Callable[..., None] | None":
+    """Return what writes a recording; None where Rerun is missing, which is said."""
+    try:
+        with needed_for(f"{RECORDING}, which `dnet play` shows,"):
+            from dnet.recorders.training_recording import write_training
+    except MissingPackage as error:
+        say(f"the training goes on without a recording: {error}")
+        return None
+    return write_training
 
 
 def _steps(history: list[dict[str, Any]]) -> list[tuple[int, dict[str, Any]]]:

@@ -7,11 +7,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from ompl import base, geometric
-from ompl import util as ompl_util
 
+from dnet.packages import needed_for
 from dnet.planning.arm import METRES_PER_UNIT, Arm
 from dnet.types import JointPath, Joints
+
+with needed_for("planning"):
+    from ompl import base, geometric
+    from ompl import util as ompl_util
 
 RESOLUTION = 0.001
 """Between two checked states of a motion, in metres of tip motion."""

@@ -4,6 +4,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from dnet.packages import needed_for
+
 
 @contextmanager
 def quiet() -> Iterator[None]:
@@ -21,7 +23,7 @@ def quiet() -> Iterator[None]:
         os.close(nowhere)
 
 
-with quiet():
+with needed_for("the simulation"), quiet():
     import pybullet
 
 __all__ = ["pybullet", "quiet"]

@@ -149,7 +149,8 @@ def _installed(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise Unavailable(f"{name} is not installed (pip install deformernet[peers])") from error
+        remedy = 'pip install "deformernet[peers]"'
+        raise Unavailable(f"{name} is not installed ({remedy})") from error
 
 
 PEERS = (

@@ -89,7 +89,6 @@ def test_a_missing_extra_is_named_with_how_to_install_it(
     ran = run("record", *arguments, *SMALL, without=without, directory=tmp_path)
     assert ran.returncode == 1
     extra = {"s3fs": "s3", "ray": "ray"}[without]
-    assert (
-        f"needs {without}, which is not installed; pip install deformernet[{extra}]" in ran.stderr
-    )
+    remedy = f'pip install "deformernet[{extra}]"'
+    assert f"needs {without}, which is not installed; {remedy}" in ran.stderr
     assert "Traceback" not in ran.stderr

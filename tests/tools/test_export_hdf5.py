@@ -55,6 +55,6 @@ def test_who_lacks_h5py_is_told_what_to_install(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(MissingExtra, match=r"pip install deformernet\[exchange\]"):
+    with pytest.raises(MissingExtra, match=r'pip install "deformernet\[exchange\]"'):
         export_hdf5(open_index(data), tmp_path / "all.h5")
     assert not list(tmp_path.iterdir())
