@@ -1,5 +1,6 @@
 """The `dnet` command: a union of commands, parsed by tyro, run, its errors said in one line."""
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from dnet.commands.record import Record
 from dnet.commands.reproduce import Reproduce
 from dnet.commands.servo import Servo
 from dnet.commands.train import Train
-from dnet.errors import DnetError
+from dnet.errors import DiskFailed, DnetError
 from dnet.packages import needed_for
 
 DESCRIPTION = """An open DeformerNet: simulate a da Vinci robot that deforms soft tissue, log it,
@@ -41,6 +42,12 @@ COMMANDS: dict[str, type[Command]] = {
     "reproduce": Reproduce,
     "demo": Demo,
 }
+
+OF_THE_DISK = frozenset(
+    getattr(errno, name)
+    for name in ("EACCES", "EDQUOT", "EFBIG", "EIO", "ENOSPC", "EPERM", "EROFS")
+)
+"""What is wrong with a disk, and not with dnet."""
 
 
 def parse(arguments: Sequence[str]) -> Command:
@@ -79,6 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # Somebody piped us into `head`: not our error, and nothing more can be said there.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        if error.errno not in OF_THE_DISK:
+            raise
+        sys.exit(f"dnet: {_printable(str(DiskFailed(error)))}")
 
 
 def _printable(text: str) -> str:

@@ -278,13 +278,10 @@ class DamagedEpisode(DnetError, ValueError):
 
 
 class WorkerDied(DnetError, RuntimeError):
-    """A process that was to record and is no more."""
+    """A process that was to do a part of the work and is no more."""
 
-    def __init__(self, folder: Path | str) -> None:
-        super().__init__(
-            f"a worker that recorded into {folder} was killed, perhaps for want of memory; "
-            "finished episodes are kept, the same call goes on; fewer --workers take less memory"
-        )
+    def __init__(self, did: str, way_out: str) -> None:
+        super().__init__(f"a process that {did} was killed, perhaps for want of memory; {way_out}")
 
 
 class NoSpace(DnetError, OSError):
@@ -292,18 +289,22 @@ class NoSpace(DnetError, OSError):
 
     def __init__(self, folder: Path | str, need: int, free: int) -> None:
         super().__init__(
-            f"{folder} has {free / 1e9:.2f} GB free, the recording takes about "
-            f"{need / 1e9:.2f} GB; make room, choose another disk, or ask for fewer --pairs, "
+            f"{folder} has {_bytes(free)} free, the recording takes about "
+            f"{_bytes(need)}; make room, choose another disk, or ask for fewer --pairs, "
             "--shapes or frames on the way"
         )
 
 
+def _bytes(count: int) -> str:
+    return f"{count / 1e9:.2f} GB" if count >= 1e9 else f"{count / 1e6:.2f} MB"
+
+
 class OutputInUse(DnetError, RuntimeError):
-    """A directory that another process records into."""
+    """A directory that another process writes into."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(
-            f"another process records into {folder}; wait for it, or choose another directory"
+            f"another process writes into {folder}; wait for it, or choose another directory"
         )
 
 
@@ -487,6 +488,16 @@ class Unwritten(DnetError, OSError):
         super().__init__(
             f"nothing can be written into {folder}: {why}; make room, or choose another directory; "
             "the originals are as they were"
+        )
+
+
+class DiskFailed(DnetError, OSError):
+    """A disk that does not take or give what is asked of it, where nothing else says so."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(
+            f"{error.filename or 'a file'}: {error.strerror}; see that there is room and that you "
+            "may read and write there; what was finished is kept"
         )
 
 

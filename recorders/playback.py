@@ -14,6 +14,7 @@ from dnet.recorders.salvage import whole_recording
 from dnet.recorders.viewer import draw, show
 from dnet.recorders.viewer_process import RERUN
 from dnet.types import Place
+from dnet.whole_file import whole_file
 
 Progress = Callable[[int, int], None]
 """Is told how many files are made ready, and how many must be."""
@@ -133,10 +134,11 @@ def _converted(
 
 
 def _save(recordings: Sequence[Path], save: Path) -> None:
-    save.parent.mkdir(parents=True, exist_ok=True)
     if len(recordings) == 1:
-        shutil.copyfile(recordings[0], save)
+        with whole_file(save) as part:
+            shutil.copyfile(recordings[0], part)
         return
+    save.parent.mkdir(parents=True, exist_ok=True)
     part = save.with_name(save.name + ".part")
     command = [*RERUN, "rrd", "merge", *map(str, recordings), "-o", str(part)]
     merged = subprocess.run(command, capture_output=True, text=True, check=False)

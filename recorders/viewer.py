@@ -20,6 +20,7 @@ from dnet.recorders.viewer_process import (
     free_port,
     running,
 )
+from dnet.whole_file import write_whole
 
 T = TypeVar("T")
 
@@ -60,8 +61,7 @@ def draw(file: Path, picture: Path, *, seconds: float | None) -> None:
             return _settled_picture(client, started)
 
     content = _tried(once, picture)
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    picture.write_bytes(content)
+    write_whole(picture, content)
 
 
 def draw_view(

@@ -15,6 +15,7 @@ from dnet.tools.material_checks import POISSON_LIMIT, YOUNG_LIMIT
 from dnet.tools.material_meshes import LEAST_THICKNESS, MOST_NODES, Resolution, choose
 from dnet.tools.material_tension import STRAIN, Tension, uniaxial
 from dnet.types import Tissue
+from dnet.whole_file import write_whole
 
 # Okabe and Ito's colours, which colour-blind people tell apart.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
@@ -39,8 +40,7 @@ def draw_material(validation: Validation, path: Path) -> None:
         panel.spines[["top", "right"]].set_visible(False)
     content = BytesIO()
     figure.savefig(content, format="png", dpi=110)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content.getvalue())
+    write_whole(path, content.getvalue())
 
 
 def _draw_tension(panel: Axes, tissue: Tissue, tension: Tension) -> None:

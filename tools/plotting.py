@@ -18,6 +18,7 @@ from dnet.tools.histogram import histogram
 from dnet.tools.plotting_shapes import Shapes, spread
 from dnet.tools.plotting_sheet import draw_sheet, rows_of
 from dnet.tools.statistics_figure import check_picture
+from dnet.whole_file import write_whole
 
 SHEETS = 12
 MEASURED = 1000
@@ -64,8 +65,7 @@ def plot_dataset(
     with rc_context({"svg.hashsalt": "dnet", "text.parse_math": False}):
         figure = _draw(shapes, distances, sheets)
         figure.savefig(content, format=ending[1:], dpi=110, metadata=dated.get(ending))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content.getvalue())
+    write_whole(path, content.getvalue())
 
 
 def _draw(shapes: Shapes, distances: Float64[np.ndarray, "_"], sheets: int) -> Figure:

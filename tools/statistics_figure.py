@@ -15,6 +15,7 @@ from dnet.tools.histogram import histogram
 from dnet.tools.statistics import AXES, SCENE
 from dnet.tools.statistics_recorded import Recorded
 from dnet.tools.statistics_values import Draws, Statistics
+from dnet.whole_file import write_whole
 
 FORMATS = (".png", ".pdf", ".svg")
 LEAST_DENSITY = 2000
@@ -53,8 +54,7 @@ def draw_statistics(index: Recorded, figures: Statistics, path: Path) -> None:
     with rc_context({"svg.hashsalt": "dnet", "text.parse_math": False}):
         figure = _draw(index, figures)
         figure.savefig(content, format=ending[1:], dpi=100, metadata=dated.get(ending))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content.getvalue())
+    write_whole(path, content.getvalue())
 
 
 def _draw(index: Recorded, figures: Statistics) -> Figure:

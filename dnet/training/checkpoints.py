@@ -1,7 +1,6 @@
 """Trained networks on disk: safetensors for the weights, JSON for all else, never a pickle."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +19,7 @@ from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
 from dnet.training.objectives import Network
+from dnet.whole_file import write_whole
 
 N = TypeVar("N", bound=Network)
 
@@ -164,17 +164,6 @@ def read_metrics(path: Path) -> dict[str, Any]:
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write `content` into the file `path`, whole or not at all."""
     write_whole(path, (json.dumps(content, indent=2) + "\n").encode())
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write `content` into the file `path`, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        beside.write_bytes(content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def weights_file(path: Path) -> Path:

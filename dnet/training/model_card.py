@@ -6,6 +6,7 @@ from dnet.errors import TooFew
 from dnet.training.run import RunWriter
 from dnet.training.scores import Errors, Scores
 from dnet.training.tasks import Task
+from dnet.whole_file import write_whole
 
 CARD = "MODEL_CARD.md"
 
@@ -20,9 +21,7 @@ def write_card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) 
         errors: Of that network on each set of frames, by its name.
         task: That the network is for.
     """
-    part = run.path / f".{CARD}.part"
-    part.write_text(card(run, errors, task), encoding="utf-8")
-    part.replace(run.path / CARD)
+    write_whole(run.path / CARD, card(run, errors, task).encode())
 
 
 def card(run: RunWriter, errors: Mapping[str, Errors | None], task: Task) -> str:

@@ -10,7 +10,8 @@ from dnet.errors import BadCheckpoint, Disagreement, MissingExtra
 from dnet.nets.deformernet import DeformerNet
 from dnet.nets.onnx_agreement import LIMIT, Agreement, agreement
 from dnet.nets.onnx_network import FEATURES, GOAL, MOTION, TABLES, OnnxDeformerNet, open_session
-from dnet.training.checkpoints import config_of, header_of, write_whole
+from dnet.training.checkpoints import config_of, header_of
+from dnet.whole_file import write_whole
 
 SUFFIX = ".onnx"
 

@@ -13,6 +13,7 @@ from dnet.training.objectives import Network
 from dnet.training.progress import EpochDone
 from dnet.training.scores import Errors
 from dnet.training.training import Training
+from dnet.whole_file import write_whole
 
 LAST, CONFIG, METRICS, STATE, ERRORS = (
     "last.safetensors",
@@ -136,9 +137,8 @@ class RunWriter:
     def _write_history(self) -> None:
         """Write the config and all epochs, each file whole or not at all."""
         write_json(self.path / CONFIG, self.content)
-        part = self.path / f".{METRICS}.part"
-        part.write_text("".join(json.dumps(line) + "\n" for line in self.history), "utf-8")
-        part.replace(self.path / METRICS)
+        lines = "".join(json.dumps(line) + "\n" for line in self.history)
+        write_whole(self.path / METRICS, lines.encode())
 
 
 def best_of(

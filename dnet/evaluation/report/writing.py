@@ -14,6 +14,7 @@ from dnet.evaluation.report.text import (
     sheets_of,
 )
 from dnet.evaluation.report.values import Report
+from dnet.whole_file import write_whole
 
 PAGE, MARKDOWN, CLAIMS = "report.html", "report.md", "report.csv"
 
@@ -25,11 +26,7 @@ def write_report(report: Report, out: Path) -> None:
         MissingExtra: If jinja2 or plotly is not there.
     """
     for name, content in _files(report).items():
-        path = out / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        part.write_bytes(content)
-        part.replace(path)
+        write_whole(out / name, content)
 
 
 def _files(report: Report) -> Mapping[str, bytes]:
