@@ -7,6 +7,7 @@ are made from the logs, and made anew where they are missing, stale, or of anoth
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +22,7 @@ from dnet.datasets.index_rows import FILE_COLUMNS, FRAME_COLUMNS, FileRows, read
 from dnet.datasets.listing import Listed, list_logs
 from dnet.datasets.sources import said
 from dnet.datasets.stores import as_place, file_system, is_url, join
-from dnet.errors import NoEpisodes, Unfetched
+from dnet.errors import NoEpisodes, Unfetched, WorkerDied
 from dnet.types import Place
 
 VERSION = "1"
@@ -74,6 +75,7 @@ def open_index(
         MissingPath: If there is no such folder.
         NoEpisodes: If it holds no `.mcap` file.
         Unfetched: If a store does not answer.
+        WorkerDied: If a process that reads is killed.
     """
     root = as_place(root)
     listed = list_logs(root)
@@ -112,11 +114,16 @@ def _read(
             yield _rows(root, one)
             on_file(done, len(wanted))
         return
-    with _executor(root, count) as executor:
-        found = executor.map(partial(_rows, root), wanted)
-        for done, rows in enumerate(found, start=1):
-            yield rows
-            on_file(done, len(wanted))
+    try:
+        with _executor(root, count) as executor:
+            found = executor.map(partial(_rows, root), wanted)
+            for done, rows in enumerate(found, start=1):
+                yield rows
+                on_file(done, len(wanted))
+    except BrokenProcessPool as error:
+        raise WorkerDied(
+            f"read the logs in {root}", "they are as they were, run the same command again"
+        ) from error
 
 
 def _workers(root: Place, files: int) -> int:

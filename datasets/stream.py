@@ -1,14 +1,37 @@
 """The streaming loader: batches in an order that can be taken up anywhere, by any workers."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from torch.utils.data import DataLoader, Sampler
 
 from dnet.datasets.batch_order import BatchOrder, Drawn
-from dnet.errors import OtherStream
+from dnet.errors import OtherStream, WorkerDied
+
+DEAD = ("is killed by signal", "exited unexpectedly")
+"""What torch says of a worker that is no more, in a plain RuntimeError."""
 
 Batch_co = TypeVar("Batch_co", covariant=True)
+
+
+@contextmanager
+def dead_workers() -> Iterator[None]:
+    """Say in our words that a process that reads ahead is no more.
+
+    Torch tells of it where it waits for a batch, or by a signal in the midst of anything.
+
+    Raises:
+        WorkerDied: If one was killed.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not any(words in str(error) for words in DEAD):
+            raise
+        raise WorkerDied(
+            "read ahead", "what was put down is kept; fewer --workers take less memory, 0 none"
+        ) from error
 
 
 @runtime_checkable
@@ -44,6 +67,7 @@ class Stream(Generic[Batch_co]):
 
     Raises:
         OtherStream: If the order is one of another number of things.
+        WorkerDied: On the way, if a process that reads ahead is killed.
     """
 
     def __init__(
@@ -80,9 +104,19 @@ class Stream(Generic[Batch_co]):
         return len(self.order)
 
     def __iter__(self) -> Iterator[Batch_co]:
-        for batch in self._loader:
+        for batch in self._batches():
             # Counted before it is handed out: who saves the state while using a batch has had it.
             self._place.advance()
+            yield batch
+
+    def _batches(self) -> Iterator[Batch_co]:
+        batches = iter(self._loader)
+        while True:
+            with dead_workers():
+                try:
+                    batch = next(batches)
+                except StopIteration:
+                    return
             yield batch
 
     def state_dict(self) -> dict[str, Any]:

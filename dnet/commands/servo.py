@@ -188,6 +188,7 @@ class Servo:
 
         from dnet.commands.stopping import stopping
         from dnet.laboratory import laboratory
+        from dnet.one_writer import one_writer
         from dnet.recorders.live_view import LiveView
         from dnet.trials.trial import run_trial
 
@@ -197,7 +198,7 @@ class Servo:
         )
         say = partial(Console().print, highlight=False, markup=False, soft_wrap=True)
         asked = threading.Event()
-        with laboratory(trial.laboratory) as lab, stopping(asked.set):
+        with one_writer(self.out), laboratory(trial.laboratory) as lab, stopping(asked.set):
             view = LiveView if self.view else None
             trace = run_trial(trial, lab, say=say, stop=asked.is_set, view=view)
         say(summary(trace))

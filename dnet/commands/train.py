@@ -1,6 +1,7 @@
 """`dnet train`: learn from recorded episodes how far the grasp must move."""
 
 import math
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -126,6 +127,7 @@ class Train:
         """
         from rich.console import Console
 
+        from dnet.one_writer import one_writer
         from dnet.training.allocation import keep_pages
         from dnet.training.parallel import meeting, this_process
 
@@ -134,7 +136,7 @@ class Train:
         device = self._device(process)
         console = Console(stderr=True, quiet=not process.first)
         keep_pages()
-        with meeting(process, device):
+        with meeting(process, device), one_writer(self.out) if process.first else nullcontext():
             self._train(process, device, console)
 
     def _train(self, process: "Process", device: "torch.device", console: "Console") -> None:
@@ -344,6 +346,7 @@ class Train:
         from dnet.commands.stopping import stopping
         from dnet.commands.training_log import TrainingLog
         from dnet.commands.training_screen import TrainingBar
+        from dnet.datasets.stream import dead_workers
         from dnet.training.division import thinned
         from dnet.training.frames import Frames
         from dnet.training.loop import HeldOut, fit
@@ -356,7 +359,12 @@ class Train:
         board = self.tensorboard and training.process.first
         say = partial(console.print, markup=False, highlight=False, soft_wrap=True)
         log = TrainingLog(run, board=board, say=say)
-        with TrainingBar(console, epochs=self.epochs) as bar, stopping(training.stop), log:
+        with (
+            dead_workers(),
+            TrainingBar(console, epochs=self.epochs) as bar,
+            stopping(training.stop),
+            log,
+        ):
             fit(
                 training,
                 HeldOut(*watched),

@@ -69,7 +69,10 @@ def record_in_processes(
             for future in sorted(finished, key=lambda one: one.exception() is not None):
                 yield future.result()
     except BrokenProcessPool as error:
-        raise WorkerDied(store.name) from error
+        raise WorkerDied(
+            f"recorded into {store.name}",
+            "finished episodes are kept, the same call goes on; fewer --workers take less memory",
+        ) from error
     finally:
         stop.set()
         pool.shutdown(cancel_futures=True)

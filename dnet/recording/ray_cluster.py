@@ -96,7 +96,9 @@ def _report(ray: Any, task: Any, store: Store, address: str) -> PairReport:
         raise
     except ray.exceptions.RayError as error:
         # Whatever became of the node, or the next: Ray has tried several.
-        raise WorkerDied(store.name) from error
+        raise WorkerDied(
+            f"recorded into {store.name}", "finished episodes are kept, the same call goes on"
+        ) from error
     return report
 
 

@@ -4,6 +4,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from multiprocessing import get_context
@@ -16,7 +17,7 @@ from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable
 from dnet.datasets.stores import join
 from dnet.datasets.table_cache import Records, TableCache
-from dnet.errors import BadEpisode, BadTables
+from dnet.errors import BadEpisode, BadTables, WorkerDied
 from dnet.geometry.sampling import farthest_rows
 from dnet.nets.deformernet import centroid
 from dnet.types import Cloud, Place, Point
@@ -72,6 +73,7 @@ class CloudTables(ABC):
                 cloud are not in farthest-point order, so that its first ones will not do.
             ChangedEpisode: If a file is not the one that was indexed.
             Unwritten: If they cannot be kept.
+            WorkerDied: If a process that finds them is killed.
         """
         missing = []
         for file, count in enumerate(self.table.lengths.tolist()):
@@ -100,8 +102,14 @@ class CloudTables(ABC):
             yield from map(self._put, files)
             return
         # A fork of a process with threads may hang.
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as executor:
-            yield from executor.map(partial(type(self)._put, self), files)
+        try:
+            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as executor:
+                yield from executor.map(partial(type(self)._put, self), files)
+        except BrokenProcessPool as error:
+            raise WorkerDied(
+                f"described the clouds of {self.table.root}",
+                "what it found is kept, run the same command again",
+            ) from error
 
     def _put(self, file: int) -> int:
         """Find and keep the records of one file; return of how many clouds."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from dnet.errors import DnetError, MissingPath, NoGoals, WorkerDied
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
+from dnet.one_writer import one_writer
 from dnet.perception.cloud_file import READERS
 from dnet.trials.request import Trial
 from dnet.trials.trial import clear, is_finished, refuse, run_trial
@@ -72,6 +73,7 @@ def run_trials(trials: Sequence[Trial], *, jobs: int, stop: Callable[[], bool]) 
 
     Raises:
         WorkerDied: If a process is killed; what was finished is kept.
+        OutputInUse: If another process carries one of them out.
     """
     if jobs == 1:
         with ExitStack() as life:
@@ -102,7 +104,10 @@ def _in_processes(trials: Sequence[Trial], jobs: int, stop: Callable[[], bool]) 
                 if report is not None:
                     yield report
     except BrokenProcessPool as error:
-        raise WorkerDied(str(trials[0].out.parent)) from error
+        raise WorkerDied(
+            f"servoed into {trials[0].out.parent}",
+            "finished runs are kept, the same call goes on; fewer --jobs take less memory",
+        ) from error
     finally:
         told.set()
         pool.shutdown(cancel_futures=True)
@@ -125,12 +130,13 @@ class _Laboratories:
 
 
 def _carry_out(trial: Trial, kept: _Laboratories, stop: Callable[[], bool]) -> Report:
-    clear(trial.out)
-    try:
-        trace = run_trial(trial, kept.of(trial.laboratory), say=_silent, stop=stop)
-    except DnetError as error:
-        refuse(trial.out, error)
-        return Report(trial, "refused", str(error))
+    with one_writer(trial.out):
+        clear(trial.out)
+        try:
+            trace = run_trial(trial, kept.of(trial.laboratory), say=_silent, stop=stop)
+        except DnetError as error:
+            refuse(trial.out, error)
+            return Report(trial, "refused", str(error))
     line = trace.reason
     if trace.steps:
         first, last = trace.steps[0].chamfer, trace.steps[-1].chamfer
