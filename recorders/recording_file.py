@@ -9,6 +9,8 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from dnet.recorders.streams import open_stream, save_stream
+
 
 @contextmanager
 def recording_file(
@@ -28,16 +30,16 @@ def recording_file(
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    recording = rr.RecordingStream(
+    recording = open_stream(
         application,
         recording_id=hashlib.sha256(f"{name}\n{path.resolve()}".encode()).hexdigest()[:32],
         # They would tell when the file was written.
-        send_properties=False,
+        properties=False,
     )
     recording.set_log_time_enabled(False)
     try:
         try:
-            recording.save(part, default_blueprint=blueprint)
+            save_stream(recording, part, blueprint=blueprint)
             recording.send_recording_name(name)
             yield recording
         finally:

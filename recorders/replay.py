@@ -25,6 +25,7 @@ from dnet.recorders.frame_columns import COUNTER, Block, FrameColumns
 from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.keypoints import log_keypoint, log_rest_shape
 from dnet.recorders.rerun_scene import RerunScene
+from dnet.recorders.streams import open_stream, save_stream
 from dnet.types import EpisodeMeta, Frame, Goal, Place, Point, Transform
 
 URDF = "psm.urdf"
@@ -101,13 +102,13 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
         BadEpisode: If a part of the episode cannot be read.
     """
     goal = episode.target()
-    recording = rr.RecordingStream(
+    recording = open_stream(
         application(episode), recording_id=_recording_id(episode.path, episode.meta.episode_id)
     )
     # When it was replayed says nothing of when it was recorded.
     recording.set_log_time_enabled(False)
     try:
-        recording.save(path, default_blueprint=_layout(goal, company))
+        save_stream(recording, path, blueprint=_layout(goal, company))
         recording.send_recording_name(episode.meta.episode_id)
         scene = _scene(recording, episode)
         scene.name_joints(JOINT_NAMES)
@@ -133,7 +134,7 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
     Raises:
         BadEpisode: If one of them is no servo run, or a part of it cannot be read.
     """
-    recording = rr.RecordingStream(
+    recording = open_stream(
         COMPARISON_APPLICATION,
         recording_id=_recording_id(path, "+".join(str(one.path) for one in episodes)),
     )
@@ -142,7 +143,7 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
     titles = {name: _title(episode) for name, episode in zip(names, episodes, strict=True)}
     end = 0.0
     try:
-        recording.save(path, default_blueprint=comparison_blueprint(titles))
+        save_stream(recording, path, blueprint=comparison_blueprint(titles))
         recording.send_recording_name(" | ".join(titles.values()))
         for name, episode in zip(names, episodes, strict=True):
             goal = episode.target()

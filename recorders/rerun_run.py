@@ -5,7 +5,6 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-import rerun as rr
 from jaxtyping import Float64
 
 from dnet.errors import OccupiedOutput
@@ -16,6 +15,7 @@ from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.rerun_scene import CHAMFER, RerunScene
 from dnet.recorders.run_sinks import OpenView, RunSinks
 from dnet.recorders.step_text import describe_step
+from dnet.recorders.streams import open_stream
 from dnet.types import Cloud, Frame, Goal, JointPath, Joints, KeypointPairs, Point, Step
 
 
@@ -55,7 +55,7 @@ class RerunRun:
         self._arms = arms
         self._now = 0.0
         self._step: int | None = None
-        self._recording = rr.RecordingStream(SERVO_APPLICATION)
+        self._recording = open_stream(SERVO_APPLICATION)
         self._sinks = RunSinks(
             self._recording, self.part, blueprint=servo_blueprint(choice=True), view=view, say=say
         )

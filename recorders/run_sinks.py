@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from dnet.errors import NoLiveView
 from dnet.recorders.live_view import LiveView
+from dnet.recorders.streams import send_stream
 
 PATIENCE_SECONDS = 3.0
 """How long a window may take to accept what it is sent, before the run goes on without it."""
@@ -50,11 +51,11 @@ class RunSinks:
             except NoLiveView as error:
                 say(str(error))
         if self._view is None:
-            recording.set_sinks(file, default_blueprint=blueprint)
+            send_stream(recording, file, blueprint=blueprint)
         else:
             # The file comes first: it is flushed whatever becomes of the window.
             sinks = (file, rr.GrpcSink(self._view.address))
-            recording.set_sinks(*sinks, default_blueprint=blueprint)
+            send_stream(recording, *sinks, blueprint=blueprint)
 
     def flush(self) -> None:
         """Bring everything to the file, and to the window."""

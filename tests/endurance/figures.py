@@ -1,0 +1,96 @@
+"""What a process and its children hold at one instant: memory, files, threads, disk."""
+
+import gc
+import os
+from collections.abc import Iterable
+from csv import DictReader, writer
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import psutil
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What was held after one round."""
+
+    round: int
+    hours: float
+    """Since the first round began."""
+    rss: int
+    """Bytes of memory that the process and its children have in RAM, shared pages included."""
+    uss: int
+    """Bytes that would be free again if they ended: shared pages left out."""
+    objects: int
+    """Python's containers in this process: what a reference that was not dropped keeps."""
+    handles: int
+    """Open files, pipes and sockets of the process and its children."""
+    threads: int
+    processes: int
+    disk: int
+    """Bytes under the directory that everything is written to, caches and scratch included."""
+    files: int
+    """Files and folders there."""
+
+
+def measure(folder: Path, *, number: int, hours: float) -> Figures:
+    """Return what this process, its children and a folder hold now.
+
+    Args:
+        folder: What the disk is measured of.
+        number: Of the round.
+        hours: Since the first round began.
+    """
+    gc.collect()  # what only waits for the collector is no leak
+    here = psutil.Process()
+    tree = [here, *here.children(recursive=True)]
+    memory = [process.memory_full_info() for process in tree]
+    there = list(_under(folder))
+    return Figures(
+        round=number,
+        hours=hours,
+        rss=sum(one.rss for one in memory),
+        uss=sum(one.uss for one in memory),
+        objects=len(gc.get_objects()),
+        handles=sum(process.num_fds() for process in tree),
+        threads=sum(process.num_threads() for process in tree),
+        processes=len(tree),
+        disk=sum(path.lstat().st_size for path in there if path.is_file()),
+        files=len(there),
+    )
+
+
+def _under(folder: Path) -> Iterable[Path]:
+    for parent, folders, files in os.walk(folder):
+        yield from (Path(parent, name) for name in (*folders, *files))
+
+
+class Table:
+    """The figures of all rounds, in a CSV that each round is written to at once."""
+
+    def __init__(self, path: Path) -> None:
+        self.rows: list[Figures] = []
+        self._file = path.open("x", encoding="utf-8", newline="")
+        self._writer = writer(self._file)
+        self._writer.writerow(field.name for field in fields(Figures))
+
+    def add(self, row: Figures) -> None:
+        """Write one row."""
+        self.rows.append(row)
+        self._writer.writerow(asdict(row).values())
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def read_table(path: Path) -> list[Figures]:
+    """Return the rows that a `Table` wrote."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return [
+            Figures(
+                hours=float(row.pop("hours")), **{name: int(value) for name, value in row.items()}
+            )
+            for row in DictReader(file)
+        ]
