@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from dnet.sim.bullet import pybullet, quiet
+from dnet.sim.bullet_mesh import reset_nodes
 from dnet.sim.material import stable_neo_hookean
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices, to_vtk
 
@@ -70,8 +71,6 @@ class SoftBody:
                 physicsClientId=client,
             )
         self._wake()
-        # Bullet leaks a copy of every new list it is handed: this one is changed in place.
-        self._rows: list[list[float]] = mesh.nodes.tolist()
         self._grips: list[int] = []
 
     def nodes(self) -> Vertices:
@@ -100,11 +99,10 @@ class SoftBody:
 
     def place(self, nodes: Sequence[int] | NodeIndices, where: Float64[np.ndarray, "_ 3"]) -> None:
         """Put nodes at given positions and leave the others where they are."""
-        for row, position in zip(self._rows, self._read(), strict=True):
-            row[:] = position
+        positions = list(self._read())
         for node, position in zip(nodes, where.tolist(), strict=True):
-            self._rows[node][:] = position
-        pybullet.resetMeshData(self.body, self._rows, physicsClientId=self._client)
+            positions[node] = position
+        reset_nodes(self.body, positions, client=self._client)
 
     def stop(self) -> None:
         """Set every node's velocity to zero: Bullet does so to a body that falls asleep."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dnet.sim.bullet import pybullet, quiet
+from dnet.sim.bullet_mesh import reset_nodes
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
 
 
@@ -40,12 +41,8 @@ class SoftPicture:
                 repulsionStiffness=0,
                 physicsClientId=client,
             )
-        # Bullet leaks a copy of every new list it is handed: this one is changed in place.
-        self._rows: list[list[float]] = mesh.nodes[self._shown].tolist()
 
     def show(self, nodes: Vertices) -> None:
         """Put the surface where the nodes are: Bullet draws that only after a step."""
-        for row, position in zip(self._rows, nodes[self._shown].tolist(), strict=True):
-            row[:] = position
-        pybullet.resetMeshData(self.body, self._rows, physicsClientId=self._client)
+        reset_nodes(self.body, nodes[self._shown].tolist(), client=self._client)
         pybullet.stepSimulation(physicsClientId=self._client)

@@ -1,0 +1,50 @@
+"""However many recordings a process writes one after another, no thread of them stays."""
+
+from pathlib import Path
+
+import psutil
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.chunk import RrdReader
+
+from dnet.recorders.streams import open_stream, save_stream, send_stream
+from tests.recorders.rrd import rows
+
+NAME = "dnet test"
+LAYOUT = rrb.Blueprint(rrb.TimeSeriesView(name="heights"))
+
+
+def saved(path: Path, *, sinks: bool) -> None:
+    """Write a recording of one value and close it."""
+    stream = open_stream(NAME, properties=False)
+    if sinks:
+        send_stream(stream, rr.FileSink(path), blueprint=LAYOUT)
+    else:
+        save_stream(stream, path, blueprint=LAYOUT)
+    stream.log("height", rr.Scalars(3.0), static=True)
+    stream.flush()
+    stream.disconnect()
+
+
+def test_a_stream_that_was_closed_leaves_no_threads(tmp_path: Path) -> None:
+    saved(tmp_path / "first.rrd", sinks=False)
+    before = psutil.Process().num_threads()
+    for number in range(4):
+        saved(tmp_path / f"{number}.rrd", sinks=number % 2 == 0)
+    # One that was closed last waits for the next one to be opened.
+    assert psutil.Process().num_threads() <= before + 2
+
+
+def test_both_ways_write_the_values_and_the_layout(tmp_path: Path) -> None:
+    for name, sinks in (("file", False), ("sinks", True)):
+        path = tmp_path / f"{name}.rrd"
+        saved(path, sinks=sinks)
+        assert rows(path, "/height", "Scalars:scalars", timeline=None) == [(None, [3.0])]
+        assert [entry.application_id for entry in RrdReader(path).blueprints()] == [NAME]
+
+
+def test_a_recording_can_do_without_a_layout(tmp_path: Path) -> None:
+    stream = open_stream(NAME)
+    save_stream(stream, tmp_path / "plain.rrd", blueprint=None)
+    stream.disconnect()
+    assert not RrdReader(tmp_path / "plain.rrd").blueprints()
