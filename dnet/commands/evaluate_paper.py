@@ -46,6 +46,12 @@ class Paper:
     """Trainings of `dnet train`, each in a directory of its own: their errors are compared."""
     checkpoint: Path | None = None
     """DeformerNet to judge and to drive with; the one that ships, unless given."""
+    keypoints: Path | None = None
+    """Run of `dnet train --model keypoints`; the network that ships, unless given."""
+    regressor: Path | None = None
+    """Run of `dnet train --model grasp`; the network that ships, unless given."""
+    dense: Path | None = None
+    """Run of `dnet train --model dense`; the network that ships, unless given."""
     world: Literal["bullet", "quasistatic"] = "bullet"
     """Where the servo cases happen: in PyBullet, or in equilibria of the same energy, faster. All
     else is in the quasi-static world, of which the networks that ship are."""
@@ -95,12 +101,14 @@ class Paper:
     def _request(self, console: "Console") -> "PaperRequest":
         from dnet.commands.paper.request import PaperRequest
 
+        grasps = {"keypoints": self.keypoints, "regressor": self.regressor, "dense": self.dense}
         return PaperRequest(
             out=self.out,
             from_mcap=self.from_mcap,
             validation=self.validation,
             runs=self.runs,
             checkpoint=self.checkpoint,
+            grasps={name: path for name, path in grasps.items() if path is not None},
             world=self.world,
             scale=self.scale,
             jobs=self.jobs,

@@ -24,9 +24,8 @@ class Reproduce:
     but for what starting takes. The data are those of the quasi-static world. The cases and goals
     are of episodes of their own, which nothing learns from.
 
-    OUT/report/report.html tells every figure of the paper beside ours, OUT/grasps how near the
-    networks come that choose where to grasp; the report servoes with those that ship
-    (pip install "deformernet[report]").
+    OUT/report/report.html tells every figure of the paper beside ours, all with the networks that
+    were trained (pip install "deformernet[report]").
 
     The command of each stage is shown, and can be run by hand. Stopped or killed, the same call
     goes on: with the stage under way where that can be gone on with, and with the next one

@@ -47,11 +47,6 @@ class Size:
             max(2, round(UNSEEN_EPISODES * root)),
         )
 
-    @property
-    def cases(self) -> int:
-        """How many shapes there are that nothing learns from."""
-        return self.unseen_episodes * UNSEEN_SHAPES
-
 
 def plan(out: Path, scale: float, *, seed: int, workers: int) -> list[Stage]:
     """Return all stages in their order; each takes what those before it left in `out`."""
@@ -89,15 +84,11 @@ def plan(out: Path, scale: float, *, seed: int, workers: int) -> list[Stage]:
             "--model hu --episodes 1 --choose-by unseen-shapes --groups 2 --epochs 150",
         ),
         Stage(
-            "grasps",
-            f"dnet evaluate grasp --from-mcap {unseen} --validation 1 --cases {size.cases} "
-            f"--keypoints {runs / 'keypoints'} --regressor {runs / 'grasp'} "
-            f"--dense {runs / 'dense'} --out {out / 'grasps'}",
-        ),
-        Stage(
             "report",
             f"dnet evaluate paper --from-mcap {unseen} --validation 1 --runs {runs} "
-            f"--checkpoint {runs / 'deformernet'} --world quasistatic --scale {min(scale, 1.0)} "
+            f"--checkpoint {runs / 'deformernet'} --keypoints {runs / 'keypoints'} "
+            f"--regressor {runs / 'grasp'} --dense {runs / 'dense'} "
+            f"--world quasistatic --scale {min(scale, 1.0)} "
             f"--seed {seed} --jobs {workers} --out {out / 'report'}",
         ),
     ]

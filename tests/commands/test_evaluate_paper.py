@@ -14,10 +14,12 @@ from markupsafe import escape
 
 from dnet.cli import main
 from dnet.commands.evaluate_paper import Paper
+from dnet.commands.paper import cases
 from dnet.commands.paper.generalisation import run_generalisation
 from dnet.commands.paper.request import PaperRequest
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import MissingExtra, MissingPath, NotAFraction
+from dnet.evaluation.report.asked import read_asked
 from dnet.evaluation.report.catalogue import EXPERIMENTS
 from dnet.evaluation.report.conditions import CONDITIONS
 from dnet.evaluation.report.page import require_report
@@ -25,6 +27,8 @@ from dnet.evaluation.report.reading import read_report
 from dnet.evaluation.report.values import LinePlot
 from dnet.evaluation.servo_scores import read_score
 from dnet.geometry.chamfer import chamfer
+from dnet.trials.request import Trial
+from dnet.weights import REGRESSOR
 
 # Every experiment but the one that records for each condition: it has a test of its own.
 ONLY = [f"--only={name}" for name in ("grasp", "cases", "importance", "networks", "goals")]
@@ -139,6 +143,21 @@ def test_the_page_needs_nothing_else(made: Path) -> None:
     for link in (one for one in links if not one.startswith("data:")):
         assert (made / link).is_file(), link
     assert any(link.endswith("run.mcap") for link in links)
+
+
+def test_own_networks_choose_where_to_grasp(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = tmp_path / "own.safetensors"
+    shutil.copy(REGRESSOR, own)
+    asked: list[Trial] = []
+    monkeypatch.setattr(cases, "finish", lambda trials, **_: asked.extend(trials))
+    cases.run_cases(PaperRequest(tmp_path, grasps={"keypoints": own}))
+    chosen_by = {one.grasp: one.grasp_checkpoint for one in asked}
+    assert chosen_by == {"keypoints": own, "regressor": None, "truth": None}
+    written = read_asked(tmp_path / "cases")
+    assert written is not None
+    assert written.weights["keypoints"] == written.weights["regressor"]
 
 
 def test_conditions_are_reported_or_said_to_be_missing(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dnet.cli import main
+from dnet.commands.evaluate_paper import Paper
 from dnet.commands.record import Record
 from dnet.commands.reproduce import ToTheEnd, command_of
-from dnet.commands.reproduction import Size, plan
+from dnet.commands.reproduction import UNSEEN_SHAPES, Size, plan
 from dnet.commands.train import Train
 
 SCALES = st.floats(1e-6, 1.0)
@@ -20,7 +21,7 @@ def commands(out: Path, scale: float) -> dict[str, object]:
 
 def test_scale_1_is_the_paper() -> None:
     assert Size.of(1.0) == Size(episodes=150, shapes=200, unseen_episodes=25)
-    assert Size.of(1.0).cases == 100
+    assert Size.of(1.0).unseen_episodes * UNSEEN_SHAPES == 100
 
 
 @given(scale=SCALES, more=SCALES)
@@ -63,6 +64,15 @@ def test_nothing_learns_from_the_unseen_data(tmp_path: Path) -> None:
     assert len({one.seed for one in recordings}) == 2
     assert {str(one.from_mcap) for one in trainings} == {str(tmp_path / "data")}
     assert {one.model for one in trainings} == {"deformernet", "hu", "grasp", "dense", "keypoints"}
+
+
+def test_the_report_is_made_with_the_networks_that_were_trained(tmp_path: Path) -> None:
+    report = commands(tmp_path, 0.02)["report"]
+    assert isinstance(report, Paper)
+    runs = tmp_path / "runs"
+    found = [report.checkpoint, report.keypoints, report.regressor, report.dense]
+    assert found == [runs / name for name in ("deformernet", "keypoints", "grasp", "dense")]
+    assert report.runs == runs
 
 
 def test_a_training_that_was_stopped_stops_the_chain(tmp_path: Path) -> None:

@@ -38,7 +38,12 @@ def run_cases(request: PaperRequest) -> None:
         seed=request.seed,
     )
     trials = {
-        name: _trials(controller, grasp, seeds, folder / controller / grasp, options)
+        name: _trials(
+            controller,
+            seeds,
+            folder / controller / grasp,
+            replace(options, grasp=grasp, grasp_checkpoint=request.grasps.get(grasp)),
+        )
         for name, (controller, grasp) in METHODS.items()
     }
     asked = request.asked(
@@ -53,13 +58,9 @@ def run_cases(request: PaperRequest) -> None:
 
 
 def _trials(
-    controller: Controller,
-    grasp: Grasp,
-    seeds: tuple[int, ...],
-    folder: Path,
-    options: ServoOptions,
+    controller: Controller, seeds: tuple[int, ...], folder: Path, options: ServoOptions
 ) -> list[Trial]:
-    plain = replace(options, grasp=grasp).trial("", folder, controller=controller)
+    plain = options.trial("", folder, controller=controller)
     return [
         replace(plain, goal=f"random:{seed}", out=folder / f"case-{number}")
         for number, seed in enumerate(seeds, start=1)

@@ -1,12 +1,11 @@
 """The experiment `generalisation`: goals of other objects, cameras and clouds than were learned."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from dnet.commands.index_bar import read_index
 from dnet.commands.paper.episodes import DATA, record
-from dnet.commands.paper.goals import directories, weights_of
+from dnet.commands.paper.goals import directories, trials_of, weights_of
 from dnet.commands.paper.request import PaperRequest
 from dnet.commands.servo import ServoOptions
 from dnet.commands.servo_batch import finish
@@ -53,7 +52,10 @@ def run_generalisation(request: PaperRequest, conditions: Sequence[Condition] = 
         prints[condition.name] = settled_frames(read_index(episodes, request.console)).fingerprint
         goals = draw_goals(episodes, [], count=count, seed=request.seed)
         place = folder / condition.folder
-        trials[condition.name] = _trials(condition, goals, place, checkpoint, request)
+        options = _options(condition, checkpoint, request)
+        trials[condition.name] = trials_of(
+            "deformernet", goals=goals, folder=place, options=options
+        )
     asked = request.asked(
         GOALS,
         weights={"deformernet": weights_of(request)["deformernet"]},
@@ -80,22 +82,13 @@ def _recording(condition: Condition, goals: int) -> RecordingRequest:
     )
 
 
-def _trials(
-    condition: Condition,
-    goals: list[str],
-    folder: Path,
-    checkpoint: Path | None,
-    request: PaperRequest,
-) -> list[Trial]:
-    options = ServoOptions(
+def _options(condition: Condition, checkpoint: Path | None, request: PaperRequest) -> ServoOptions:
+    return ServoOptions(
         world=condition.world,
         checkpoint=checkpoint,
         depth_noise=condition.noise,
         seed=request.seed,
     )
-    plain = options.trial("", folder, controller="deformernet")
-    trials = [replace(plain, goal=goal, recording=False) for goal in goals]
-    return [replace(one, out=folder / one.goal_name) for one in trials]
 
 
 def _network(condition: Condition, request: PaperRequest) -> Path | None:

@@ -5,14 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from dnet.commands.paper.episodes import unseen_episodes
-from dnet.commands.paper.request import PaperRequest, hu_weights
+from dnet.commands.paper.request import PaperRequest, grasp_weights, hu_weights
 from dnet.commands.servo import Controller, Grasp, ServoOptions
 from dnet.commands.servo_batch import finish
 from dnet.evaluation.report.asked import write_asked
 from dnet.evaluation.servo_goals import draw_goals
 from dnet.training.checkpoints import weights_file
 from dnet.trials.request import Trial
-from dnet.weights import DEFORMERNET, DENSE, KEYPOINTS, REGRESSOR
+from dnet.weights import DEFORMERNET
 
 GOALS = 100
 METHODS: tuple[tuple[Controller, Grasp], ...] = (
@@ -49,10 +49,12 @@ def run_goals(request: PaperRequest) -> None:
         hu_checkpoint=request.hu,
         seed=request.seed,
     )
-    trials = {
-        method_name(*method): trials_of(*method, goals=goals, folder=folder, options=options)
-        for method in METHODS
-    }
+    trials: dict[str, list[Trial]] = {}
+    for controller, grasp in METHODS:
+        own = replace(options, grasp=grasp, grasp_checkpoint=request.grasps.get(grasp))
+        name = method_name(controller, grasp)
+        place = folder / name.replace(" + ", "-")
+        trials[name] = trials_of(controller, goals=goals, folder=place, options=own)
     asked = request.asked(
         GOALS,
         weights=weights_of(request),
@@ -70,19 +72,12 @@ def method_name(controller: str, grasp: str) -> str:
 
 
 def trials_of(
-    controller: Controller,
-    grasp: Grasp,
-    *,
-    goals: list[str],
-    folder: Path,
-    options: ServoOptions,
-    recording: bool = False,
+    controller: Controller, *, goals: list[str], folder: Path, options: ServoOptions
 ) -> list[Trial]:
-    """Return a run to each goal, each in a directory of its method's."""
-    plain = replace(options, grasp=grasp).trial("", folder, controller=controller)
-    place = folder / method_name(controller, grasp).replace(" + ", "-")
-    trials = [replace(plain, goal=goal, recording=recording) for goal in goals]
-    return [replace(one, out=place / one.goal_name) for one in trials]
+    """Return a run to each goal, each in a directory of its own in `folder`."""
+    plain = options.trial("", folder, controller=controller)
+    trials = [replace(plain, goal=goal, recording=False) for goal in goals]
+    return [replace(one, out=folder / one.goal_name) for one in trials]
 
 
 def directories(trials: Mapping[str, list[Trial]], folder: Path) -> dict[str, tuple[str, ...]]:
@@ -99,7 +94,5 @@ def weights_of(request: PaperRequest) -> dict[str, Path]:
     return {
         "deformernet": DEFORMERNET if own is None else weights_file(own),
         "hu": hu_weights(request),
-        "keypoints": KEYPOINTS,
-        "regressor": REGRESSOR,
-        "dense": DENSE,
+        **grasp_weights(request),
     }

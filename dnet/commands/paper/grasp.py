@@ -4,11 +4,10 @@ from dataclasses import replace
 
 from dnet.commands.evaluate_grasp import Grasp
 from dnet.commands.paper.episodes import unseen_episodes
-from dnet.commands.paper.request import PaperRequest
+from dnet.commands.paper.request import PaperRequest, grasp_weights
 from dnet.evaluation.report.asked import read_asked, write_asked
 from dnet.evaluation.report.grasp_section import ANSWERS, RECORDING
 from dnet.evaluation.report.published import GRASP_CASES
-from dnet.weights import DENSE, KEYPOINTS, REGRESSOR
 
 
 def run_grasp(request: PaperRequest) -> None:
@@ -21,7 +20,7 @@ def run_grasp(request: PaperRequest) -> None:
     episodes = unseen_episodes(request, request.count(GRASP_CASES))
     asked = request.asked(
         GRASP_CASES,
-        weights={"keypoints": KEYPOINTS, "regressor": REGRESSOR, "dense": DENSE},
+        weights=grasp_weights(request),
         data={episodes.folder.name: episodes.unseen.fingerprint},
     )
     # A report at another scale may have as many cases.
@@ -35,6 +34,7 @@ def run_grasp(request: PaperRequest) -> None:
         episodes.folder,
         folder,
         cases=asked.count,
+        **request.grasps,
         validation=1.0 if request.from_mcap is None else request.validation,
         seed=request.seed,
     ).run()

@@ -16,7 +16,7 @@ from dnet.evaluation.report.trainings import read_training
 from dnet.laboratory import SHAPING
 from dnet.training.checkpoints import weights_file
 from dnet.training.run import is_finished, read_config
-from dnet.weights import HU
+from dnet.weights import DENSE, HU, KEYPOINTS, REGRESSOR
 
 MODELS = ("deformernet", "hu")
 VERSIONS = (*SHAPING, "torch")
@@ -36,6 +36,9 @@ class PaperRequest:
     """Directory of trainings."""
     checkpoint: Path | None = None
     """The DeformerNet to drive with; None for the one that ships."""
+    grasps: Mapping[str, Path] = field(default_factory=dict)
+    """The networks that choose where to grasp, by the name of their method; those that are not
+    here are the ones that ship."""
     world: Literal["bullet", "quasistatic"] = "bullet"
     """Where the cases of the paper happen, and the two manipulation points."""
     scale: float = 1.0
@@ -96,6 +99,12 @@ class PaperRequest:
 def hu_weights(request: PaperRequest) -> Path:
     """Return the file of the network of Hu et al. that is driven with."""
     return HU if request.hu is None else weights_file(request.hu)
+
+
+def grasp_weights(request: PaperRequest) -> dict[str, Path]:
+    """Return the file of each network that chooses where to grasp, by the name of its method."""
+    own = {name: weights_file(run) for name, run in request.grasps.items()}
+    return {"keypoints": KEYPOINTS, "regressor": REGRESSOR, "dense": DENSE} | own
 
 
 def digest(path: Path) -> str:
