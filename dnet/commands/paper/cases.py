@@ -9,7 +9,7 @@ from dnet.commands.paper.request import PaperRequest
 from dnet.commands.servo import Controller, Grasp, ServoOptions
 from dnet.commands.servo_batch import finish
 from dnet.evaluation.report.asked import write_asked
-from dnet.evaluation.report.cases_section import HU_TRUE_POINT
+from dnet.evaluation.report.cases_claims import HU_TRUE_POINT
 from dnet.trials.request import Trial
 
 SEEDS = (2_000_000, 2_000_001, 2_000_002, 2_000_003)

@@ -7,7 +7,7 @@ import polars as pl
 
 from dnet.errors import BadReport
 from dnet.evaluation.report.asked import Asked
-from dnet.evaluation.report.published import GRASP_CASES, GRASP_MM
+from dnet.evaluation.report.published import GRASP_CASES, GRASP_MM, METHODS
 from dnet.evaluation.report.values import (
     Cell,
     Claim,
@@ -33,7 +33,6 @@ _COLUMNS = (
     Column("worst, mm", 1),
     Column("no answer", 0),
 )
-_PAPER_NAMES = {"keypoints": "keypoint method", "regressor": "PointConv method"}
 
 
 def grasp_section(folder: Path, asked: Asked | None, *, title: str, out: Path) -> Section:
@@ -125,7 +124,7 @@ def _shares(values: Values) -> tuple[Values, Values]:
 def _claims(found: dict[str, tuple[Values, int]], asked: Asked | None) -> tuple[Claim, ...]:
     claims = []
     for name, paper in GRASP_MM.items():
-        what = f"mean distance over {GRASP_CASES} cases, {_PAPER_NAMES[name]}"
+        what = f"mean distance over {GRASP_CASES} cases, {METHODS[name]}"
         if asked is None or name not in found:
             claims.append(Claim("table 1", what, f"{paper:.0f} mm", "", None, "not run"))
             continue

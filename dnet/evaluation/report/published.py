@@ -2,6 +2,9 @@
 
 from collections.abc import Mapping
 
+METHODS: Mapping[str, str] = {"keypoints": "keypoint method", "regressor": "PointConv method"}
+"""What the paper calls its two ways to choose the manipulation point."""
+
 GRASP_MM: Mapping[str, float] = {"keypoints": 35.0, "regressor": 36.0}
 """Mean distance of the manipulation point from the truth over 100 cases, in millimetres (Thach,
 Kuntz, Hermans 2021, the results; 0.035 m and 0.036 m there)."""
