@@ -16,13 +16,15 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import polars as pl
-from polars.exceptions import PolarsError
+from polars.exceptions import PanicException, PolarsError
 
 from dnet.datasets.index_rows import FILE_COLUMNS, FRAME_COLUMNS, FileRows, read_rows
+from dnet.datasets.index_trust import SPARE, believable, worth_reading
 from dnet.datasets.listing import Listed, list_logs
 from dnet.datasets.sources import said
 from dnet.datasets.stores import as_place, file_system, is_url, join
-from dnet.errors import NoEpisodes, Unfetched, WorkerDied
+from dnet.errors import NoEpisodes, TooLarge, Unfetched, WorkerDied
+from dnet.file_sizes import read_at_most
 from dnet.types import Place
 
 VERSION = "1"
@@ -81,8 +83,10 @@ def open_index(
     listed = list_logs(root)
     if not listed:
         raise NoEpisodes(root)
-    stored = _load(root)
+    stored = _load(root, listed)
     kept = _unchanged(stored, listed)
+    if stored is not None and not _believable(stored, kept):
+        stored, kept = None, set()
     wanted = [one for one in listed if one.name not in kept]
     if stored is not None and not wanted and len(kept) == stored.files.height:
         return stored
@@ -156,34 +160,49 @@ def _merged(root: Place, stored: Index | None, kept: set[str], read: Sequence[Fi
     )
 
 
-def _load(root: Place) -> Index | None:
+def _believable(stored: Index, kept: set[str]) -> bool:
+    """Return whether what it says of the files that are still there can be true."""
+    there = pl.col("name").is_in(kept)
+    return believable(stored.files.filter(there), stored.frames.filter(there))
+
+
+def _load(root: Place, listed: Sequence[Listed]) -> Index | None:
     """Return the index as it was stored, None if there is none that can be used."""
+    sizes = {one.name: one.size for one in listed}
     try:
-        contents = {name: _content(root, name) for name in (FILES, FRAMES)}
-        for content in contents.values():
+        most = sum(sizes.values()) + SPARE
+        told, seen = (_content(root, name, most=most) for name in (FILES, FRAMES))
+        for content in (told, seen):
             if pl.read_parquet_metadata(BytesIO(content)).get("dnet.index") != VERSION:
                 return None
-        files, frames = (pl.read_parquet(BytesIO(contents[name])) for name in (FILES, FRAMES))
-    except (OSError, PolarsError, Unfetched):
+        if not worth_reading(told, seen, sizes=sizes):
+            return None
+        files, frames = (pl.read_parquet(BytesIO(content)) for content in (told, seen))
+    # The reader of somebody else's files may also give up in the middle.
+    except (OSError, PolarsError, PanicException, Unfetched, TooLarge):
         return None
     if dict(files.schema) != _schema(FILE_COLUMNS) or dict(frames.schema) != _schema(FRAME_COLUMNS):
         return None
     # Two tables that were written by two processes at a time need not go together.
     counted = frames.group_by("name").len("frames").sort("name")
-    told = files.filter(pl.col("frames") > 0).select("name", pl.col("frames").cast(pl.UInt32))
-    return Index(root, files, frames) if counted.equals(told.sort("name")) else None
+    stated = files.filter(pl.col("frames") > 0).select("name", pl.col("frames").cast(pl.UInt32))
+    return Index(root, files, frames) if counted.equals(stated.sort("name")) else None
 
 
 def _schema(columns: dict[str, object]) -> dict[str, object]:
     return dict(pl.Schema(columns))  # type: ignore[arg-type]
 
 
-def _content(root: Place, name: str) -> bytes:
+def _content(root: Place, name: str, *, most: int) -> bytes:
     if not is_url(root):
-        return (Path(root) / name).read_bytes()
+        return read_at_most(Path(root) / name, most, what="index")
     files, path = file_system(str(root), doing="reading")
     try:
+        if (size := files.info(f"{path}/{name}")["size"]) > most:
+            raise TooLarge("index", join(root, name), size, most)
         content: bytes = files.cat_file(f"{path}/{name}")
+    except TooLarge:
+        raise
     # Stores raise what they like.
     except Exception as error:
         raise Unfetched(str(join(root, name)), said(error)) from error

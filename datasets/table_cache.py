@@ -12,6 +12,7 @@ from platformdirs import user_cache_path
 
 from dnet.datasets.stores import is_url
 from dnet.errors import Unwritten
+from dnet.plain_names import plain_name
 from dnet.types import Place
 
 FOLDER = ".cache"
@@ -66,6 +67,7 @@ class TableCache:
 
     def _path(self, digest: str) -> Path:
         version = sha256(self.version.encode()).hexdigest()[:16]
+        plain_name(digest, what="the SHA-256 of an episode")
         return self.folder / f"{self.kind}-{version}" / f"{digest}.npy"
 
 

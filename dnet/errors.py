@@ -720,3 +720,23 @@ class NoFilm(DnetError, ValueError):
 
     def __init__(self, path: Path, kinds: tuple[str, ...]) -> None:
         super().__init__(f"{path} is no film; let its name end in {' or '.join(kinds)}")
+
+
+class BadName(DnetError, ValueError):
+    """A name in a file that is no name of one."""
+
+    def __init__(self, what: str, name: object, why: str) -> None:
+        super().__init__(
+            f"{what} is {_short(name)}, {why}; it must be one name of at most 255 bytes, without / "
+            "and \\: rename it where it comes from, or leave that file out"
+        )
+
+
+class TooLarge(DnetError, ValueError):
+    """A file, or a part of one, that is larger than anything of its kind."""
+
+    def __init__(self, what: str, path: Path | str, got: int, most: int) -> None:
+        super().__init__(
+            f"{what} {path} has {got} bytes, at most {most} are read; it is not what its name says"
+            ", or was not made by dnet: see where it comes from"
+        )
