@@ -64,6 +64,9 @@ FRAME_COLUMNS: dict[str, Any] = {
 manipulation point and its motion since frame 0 (m); points of the cloud, and a hash of them: equal
 clouds have equal ones; and where the cloud lies, as `dnet.datasets.reader.CloudPlace` says."""
 
+LARGEST_FETCHED = 4 * 2**30
+"""Bytes of a log in a store that is still fetched as a whole to be indexed."""
+
 _UNKNOWN = dict.fromkeys(FILE_COLUMNS) | {"frames": 0, "shapes": 0, "finished": False}
 
 
@@ -106,6 +109,9 @@ def read_rows(root: Place, name: str, *, version: str, size: int) -> FileRows:
 def _source(place: Place, size: int) -> Source:
     if not is_url(place):
         return MappedFile(Path(place))
+    if size > LARGEST_FETCHED:
+        why = f"has {size} bytes, at most {LARGEST_FETCHED} are fetched at once"
+        raise BadEpisode(place, why, "index it in a folder of this machine")
     # All of it is needed: one request is quicker than one for each block.
     files, path = file_system(str(place), doing="reading")
     return Fetched(fetch(files, path, name=str(place), start=0, stop=size))

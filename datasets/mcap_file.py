@@ -24,6 +24,8 @@ from dnet.errors import BadEpisode
 from dnet.types import Place
 
 CACHED_CHUNKS = 4
+LARGEST_ATTACHED = 256 * 2**20
+"""Bytes of an attached file or of metadata that are still read; dnet writes 12 KiB."""
 
 Entries = Int64[np.ndarray, "_ 3"]
 """Messages of a topic in file order: log time, chunk, offset in the chunk."""
@@ -120,7 +122,7 @@ class McapFile:
         try:
             return Metadata.read(parse(self._record(place, Opcode.METADATA))).metadata
         except UNREADABLE as error:
-            raise damaged(self.path, f"its metadata {name} is unreadable") from error
+            raise damaged(self.path, f"its metadata {name} is unreadable ({error})") from error
 
     @property
     def attachments(self) -> tuple[str, ...]:
@@ -137,7 +139,7 @@ class McapFile:
             content = Attachment.read(parse(record)).data
             (crc,) = _CRC.unpack(record[-_CRC.size :])
         except UNREADABLE as error:
-            raise damaged(self.path, f"its attachment {name} is unreadable") from error
+            raise damaged(self.path, f"its attachment {name} is unreadable ({error})") from error
         if crc and zlib.crc32(record[: -_CRC.size]) != crc:
             raise damaged(self.path, f"its attachment {name} fails its checksum")
         return content
@@ -181,6 +183,8 @@ class McapFile:
         offset, length = extent
         if length > len(self._source) or offset > len(self._source) - length:
             raise ValueError("outside the file")
+        if length > LARGEST_ATTACHED:
+            raise ValueError(f"{length} bytes, at most {LARGEST_ATTACHED} are read")
         record = self._source.view(offset, offset + length)
         kind, size = RECORD.unpack_from(record)
         if kind != opcode or size != length - RECORD.size:

@@ -42,6 +42,10 @@ LARGEST_MESSAGE = 64 * 1024
 parsed ones take many times their bytes."""
 MOST_TRANSFORMS = 256
 """Transforms of one message that are still read: dnet writes 25."""
+LARGEST_DOCUMENT = 16 * 2**20
+"""Bytes of JSON in the metadata that are still parsed; dnet writes 10 KiB."""
+MOST_CELLS = 1_000_000
+"""Cells of an object's mesh that are still believed; dnet makes 256, and at most some thousands."""
 UNIT_TOLERANCE = 0.01
 """How far the length of a quaternion may be from 1 for a rotation that is still read."""
 
@@ -134,7 +138,7 @@ def read_pose(message: memoryview, *, frame: str) -> Pose:
 
 def read_line(message: memoryview) -> str:
     """Return the text of a foxglove.Log."""
-    text: str = Log.FromString(bytes(message)).message
+    text: str = Log.FromString(_small(message)).message
     return text
 
 
@@ -158,7 +162,7 @@ def read_step(message: memoryview) -> dict[str, Any]:
 
 def read_meta(record: Mapping[str, str]) -> EpisodeMeta:
     """Return what the metadata `dnet.episode` says."""
-    scene = json.loads(record["scene"])
+    scene = _document(record["scene"])
     return EpisodeMeta(
         episode_id=record["episode_id"],
         seed=int(record["seed"]),
@@ -170,17 +174,23 @@ def read_meta(record: Mapping[str, str]) -> EpisodeMeta:
             manipulation_point=_numbers(scene["manipulation_point"], 3),
             tissue=_read_tissue(scene["tissue"]),
         ),
-        settings=dict(json.loads(record["settings"])),
+        settings=dict(_document(record["settings"])),
     )
 
 
 def _read_tissue(record: Mapping[str, Any]) -> Tissue:
     if record["shape"] not in _SHAPES:
         raise ValueError(f"an object of shape {str(record['shape'])[:40]!r}")
+    # Each cell becomes several tetrahedra of a mesh: two dozen bytes could ask for all memory.
     cells = _numbers(record["cells"], 3)
+    if any(cell < 1 or cell != int(cell) for cell in cells) or math.prod(cells) > MOST_CELLS:
+        raise ValueError(f"a mesh of {str(record['cells'])[:40]} cells, at most {MOST_CELLS}")
+    size = _numbers(record["size"], 3)
+    if min(size) < 0:
+        raise ValueError(f"an object of {str(record['size'])[:40]} m")
     return Tissue(
         shape=record["shape"],
-        size=_numbers(record["size"], 3),
+        size=size,
         cells=(int(cells[0]), int(cells[1]), int(cells[2])),
         young=_finite(record["young"]),
         poisson=_finite(record["poisson"]),
@@ -190,7 +200,13 @@ def _read_tissue(record: Mapping[str, Any]) -> Tissue:
 
 def read_result(record: Mapping[str, str]) -> dict[str, Any]:
     """Return what the metadata `dnet.result` says."""
-    return {key: json.loads(value) for key, value in record.items()}
+    return {key: _document(value) for key, value in record.items()}
+
+
+def _document(text: str) -> Any:
+    if len(text) > LARGEST_DOCUMENT:
+        raise ValueError(f"{len(text)} bytes of JSON, at most {LARGEST_DOCUMENT} are parsed")
+    return json.loads(text)
 
 
 def _read_pixels(message: memoryview, encoding: str, dtype: np.dtype[Any]) -> Any:

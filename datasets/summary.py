@@ -22,6 +22,9 @@ RECORD = struct.Struct("<BQ")
 """How every record begins: opcode and length."""
 UNREADABLE = (struct.error, ValueError, IndexError, OverflowError, McapError)
 """What parsers raise on bytes that are not what they claim to be."""
+LARGEST_SUMMARY = 64 * 2**20
+"""Bytes of the summary that are still read: those of an episode of some hundred thousand chunks,
+which is as many as has 50 GB."""
 MOST_NAMES = 4096
 """Channels, attachments or metadata records of a file that are still read; dnet writes 13, 3, 2."""
 
@@ -85,6 +88,9 @@ def read_summary(name: Place, source: Source) -> Summary:
         raise cut_off(name)
     if not len(MAGIC) <= start <= footer:
         raise unindexed(name)
+    if end - start > LARGEST_SUMMARY:
+        why = f"its summary has {end - start} bytes, at most {LARGEST_SUMMARY} are read"
+        raise damaged(name, why)
     content = source.view(start, end)
     # The checksum covers the summary and the footer up to the checksum itself.
     if crc and zlib.crc32(content[: -_CRC.size]) != crc:

@@ -25,6 +25,7 @@ from dnet.recorders.frame_columns import COUNTER, Block, FrameColumns
 from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.keypoints import log_keypoint, log_rest_shape
 from dnet.recorders.rerun_scene import RerunScene
+from dnet.recorders.robot_description import read_urdf
 from dnet.recorders.streams import open_stream, save_stream
 from dnet.types import EpisodeMeta, Frame, Goal, Place, Point, Transform
 
@@ -266,7 +267,8 @@ def _scene(
 ) -> RerunScene:
     urdf = episode.attachment(URDF) if URDF in episode.attachments else b""
     try:
-        return RerunScene(recording, urdf=urdf.decode(), counter=COUNTER, place=place)
+        text = read_urdf(urdf) if urdf else ""
+        return RerunScene(recording, urdf=text, counter=COUNTER, place=place)
     except (ValueError, RuntimeError) as error:
         why = f"has an unreadable attachment {URDF} ({error})"
         raise BadEpisode(episode.path, why, "record it again") from error

@@ -1,6 +1,8 @@
 """The arrays of one .npz, whoever wrote it, as what an episode is made of, or refused."""
 
 import json
+import lzma
+import math
 import re
 import zipfile
 import zlib
@@ -17,12 +19,24 @@ from dnet.errors import BadArrays, MissingPath
 from dnet.types import Cloud, FrameKind, Nodes
 
 KNOWN = ("clouds", "grasps", "kinds", "times", "joints", "nodes", "meta")
+LARGEST_ARRAYS = 2**30
+"""Bytes of all arrays of a file together, unpacked, that are taken: those of 40,000 frames."""
+MOST_ARRAYS = 100_000
+"""Arrays of a file; there are two a frame where clouds differ in their number of points."""
 LONGEST = 9e9
 """Seconds of simulation that a log can hold: it counts nanoseconds in 63 bits."""
 
 _KINDS = get_args(FrameKind)
+_HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 _NUMBERED = re.compile(r"(cloud|nodes)_(\d+)")
-_UNREADABLE = (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error)
+_UNREADABLE = (
+    *(OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error),
+    # Of a way to compress that Python does not know, of passwords, and of names that are no text.
+    *(NotImplementedError, RuntimeError, KeyError, lzma.LZMAError),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +80,7 @@ def read_arrays(path: Path) -> ImportedArrays:
             raise BadArrays(path, f"is no .npz ({error})") from error
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise BadArrays(path, "is a single array, not a .npz of several")
+        _require_size(path, archive)
         return _Reading(path, opened.enter_context(archive)).all()
 
 
@@ -200,12 +215,54 @@ class _Reading:
 
     def _array(self, name: str) -> np.ndarray:
         try:
+            _require_room(self._archive, name)
             return np.asarray(self._archive[name])
         except _UNREADABLE as error:
             raise self._bad(f"has an unreadable `{name}` ({error})") from error
 
     def _bad(self, why: str) -> BadArrays:
         return BadArrays(self._path, why)
+
+
+def _require_size(path: Path, archive: np.lib.npyio.NpzFile) -> None:
+    """Refuse a file that becomes larger than any episode when it is unpacked.
+
+    Raises:
+        BadArrays: If it says so of itself; more than it says is not unpacked.
+    """
+    members = _zip(archive).infolist()
+    size = sum(one.file_size for one in members)
+    if size > LARGEST_ARRAYS or len(members) > MOST_ARRAYS:
+        raise BadArrays(
+            path,
+            f"holds {len(members)} arrays of {size} bytes when unpacked, at most {MOST_ARRAYS} and "
+            f"{LARGEST_ARRAYS} are taken",
+        )
+
+
+def _require_room(archive: np.lib.npyio.NpzFile, name: str) -> None:
+    """Refuse an array of more numbers than its member of the file has bytes for.
+
+    Raises:
+        ValueError: If it is such a one, or none; or another of `_UNREADABLE`.
+    """
+    opened = _zip(archive)
+    names = opened.namelist()
+    member = name if name in names else f"{name}.npy"
+    with opened.open(member) as file:
+        version = np.lib.format.read_magic(file)
+        if version not in _HEADERS:
+            raise ValueError(f"an array of version {version}")
+        shape, _, dtype = _HEADERS[version](file)
+    need, there = math.prod(shape) * dtype.itemsize, opened.getinfo(member).file_size
+    if need > there:
+        raise ValueError(f"an array of {need} bytes, of which there are {there}")
+
+
+def _zip(archive: np.lib.npyio.NpzFile) -> zipfile.ZipFile:
+    if archive.zip is None:
+        raise ValueError("it is closed")
+    return archive.zip
 
 
 def _decoded(values: np.ndarray) -> list[str]:

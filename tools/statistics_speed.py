@@ -1,11 +1,12 @@
 """How fast a recording was made: `timings.jsonl`, a line for each episode as it ended."""
 
-import json
 import math
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
+
+from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most
 
 TIMINGS = "timings.jsonl"
 
@@ -71,7 +72,8 @@ def read_speed(directory: Path) -> Speed | None:
     path = directory / TIMINGS
     if not path.is_file():
         return None
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    content = read_at_most(path, LARGEST_JSON, what="timings")
+    lines = content.decode("utf-8", errors="replace").splitlines()
     timings = [timing for timing in map(_read, lines) if timing is not None]
     if not timings:
         return None
@@ -113,7 +115,7 @@ def _covered(timings: list[_Timing]) -> float:
 def _read(line: str) -> _Timing | None:
     """Return what a line says, None if it was cut off."""
     try:
-        record = json.loads(line)
+        record = parse_json(line)
         timing = _Timing(
             str(record["host"]) if "host" in record else "",
             int(record["worker"]),

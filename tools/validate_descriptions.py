@@ -5,12 +5,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
-from xml.parsers import expat
 
 from mcap.records import Metadata
 
 from dnet.datasets import messages
 from dnet.datasets.reader import SCHEMA_VERSION
+from dnet.recorders.robot_description import read_urdf
 from dnet.tools.validate_findings import Findings
 from dnet.types import EpisodeMeta
 
@@ -80,7 +80,7 @@ def check_attachments(attachments: Sequence[tuple[str, memoryview]], findings: F
         if count > 1:
             findings.warn("attachment", f"there are {count} of name {name}, readers take the last")
     parsers: dict[str, Callable[[bytes], object]] = {
-        "psm.urdf": _parse_urdf,
+        "psm.urdf": read_urdf,
         "config.json": json.loads,
     }
     for name, content in attachments:
@@ -94,29 +94,5 @@ def check_attachments(attachments: Sequence[tuple[str, memoryview]], findings: F
             continue
         try:
             parsers[name](bytes(content))
-        except (ValueError, RecursionError, expat.ExpatError) as error:
+        except (ValueError, RecursionError) as error:
             findings.error("attachment", f"{name} cannot be parsed: {error}")
-
-
-def _parse_urdf(content: bytes) -> None:
-    """Go through an XML document, of which nothing is kept.
-
-    Raises:
-        ValueError, ExpatError: If it is none, or no robot, or declares entities, of which a few
-            lines can make gigabytes.
-    """
-    roots: list[str] = []
-
-    def start(name: str, _attributes: dict[str, str]) -> None:
-        if not roots:
-            roots.append(name)
-
-    def refuse(*_declaration: object) -> None:
-        raise ValueError("it declares entities")
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    parser.EntityDeclHandler = refuse
-    parser.Parse(content, True)
-    if roots != ["robot"]:
-        raise ValueError(f"its root is {roots[0][:40]!r}, must be 'robot'")

@@ -1,17 +1,15 @@
 """The manifest of a recording: whether the episodes beside it are those that it names."""
 
 import hashlib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dnet.file_sizes import read_json
 from dnet.tools.validate_episode import CheckedEpisode
 from dnet.tools.validate_findings import Finding, Findings
 
 MANIFEST = "manifest.json"
-LARGEST_MANIFEST = 256 * 2**20
-"""Bytes of a manifest that are still read: those of a million episodes."""
 
 
 def check_manifest(directory: Path, episodes: Sequence[CheckedEpisode]) -> list[Finding]:
@@ -46,10 +44,7 @@ def check_manifest(directory: Path, episodes: Sequence[CheckedEpisode]) -> list[
 
 
 def _entries(path: Path) -> dict[str, Any]:
-    size = path.stat().st_size
-    if size > LARGEST_MANIFEST:
-        raise ValueError(f"it has {size} bytes, at most {LARGEST_MANIFEST} are read")
-    entries = json.loads(path.read_bytes())["episodes"]
+    entries = read_json(path, what="manifest")["episodes"]
     if not isinstance(entries, dict):
         raise TypeError("its episodes are none")
     return entries

@@ -1,19 +1,19 @@
 """What the demo takes as its goal, and what it tells at the end, read back from its files."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
 from dnet.datasets.reader import EpisodeReader
+from dnet.plain_names import plain_name
 from dnet.tools.listing import list_episodes
-from dnet.training.run import METRICS, best_of, main_scores, read_config
+from dnet.training.run import best_of, main_scores, read_config, read_history
 
 
 def held_out_goal(data: Path, train: Path) -> tuple[Path, int]:
     """Return an episode that was not trained on, and its shape farthest from rest."""
-    name = read_config(train)["data"]["unseen_episodes"][0]
+    name = plain_name(read_config(train)["data"]["unseen_episodes"][0], what=f"a goal of {train}")
     path = data / f"{name}.mcap"
     with EpisodeReader(path) as episode:
         motions = np.linalg.norm(episode.grasps - episode.grasps[0], axis=1)
@@ -23,7 +23,7 @@ def held_out_goal(data: Path, train: Path) -> tuple[Path, int]:
 def summary(out: Path, seconds: dict[str, float]) -> Table:
     """Return the closing table of the demo in `out`."""
     shapes = int(list_episodes(out / "data")["shapes"].sum())
-    epochs = [json.loads(line) for line in (out / "train" / METRICS).read_text().splitlines()]
+    epochs = read_history(out / "train")
     best = main_scores((best_of(epochs) or epochs[-1])["unseen_episodes"])
     with EpisodeReader(out / "servo" / "run.mcap") as episode:
         result, goal = episode.result or {}, episode.meta.settings["goal"]

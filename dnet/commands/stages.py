@@ -7,7 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from rich.console import Console
 
-from dnet.errors import OccupiedOutput
+from dnet.errors import BadReport, OccupiedOutput, TooLarge
+from dnet.file_sizes import read_json
 
 
 @runtime_checkable
@@ -28,6 +29,7 @@ class Stages:
 
     Raises:
         OccupiedOutput: If `file` tells of a chain with other options.
+        BadReport: If it does not tell of one.
     """
 
     def __init__(self, file: Path, options: dict[str, Any], console: Console) -> None:
@@ -36,7 +38,7 @@ class Stages:
         self._stopped: dict[str, float] = {}
         self._file, self._options, self._console = file, options, console
         if file.exists():
-            state = json.loads(file.read_text(encoding="utf-8"))
+            state = _read(file)
             if state["options"] != options:
                 held = f"a {file.stem} with other options ({state['options']})"
                 raise OccupiedOutput(file.parent, held)
@@ -64,3 +66,16 @@ class Stages:
         part = self._file.with_suffix(".part")
         part.write_text(json.dumps(state, indent=2), encoding="utf-8")
         part.replace(self._file)
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        state = read_json(file, what="list of stages")
+        times = (*state["seconds"].values(), *state.get("stopped", {}).values())
+        if not all(isinstance(one, int | float) for one in times):
+            raise TypeError("its seconds are no numbers")
+        return {**state, "options": state["options"]}
+    except TooLarge:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BadReport(file, f"is unreadable ({error!r})", "remove it to begin anew") from error

@@ -1,13 +1,13 @@
 """What each choice in the network and its training is worth, by trainings one choice apart."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint
-from dnet.training.run import ERRORS, METRICS
+from dnet.file_sizes import read_json
+from dnet.training.run import ERRORS, read_history
 
 ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "as by default": {},
@@ -63,8 +63,8 @@ def read_ablation(name: str, run: Path) -> Ablation:
         BadCheckpoint: If it is not finished, or unreadable.
     """
     try:
-        errors = json.loads((run / ERRORS).read_text("utf-8"))
-        last = json.loads((run / METRICS).read_text("utf-8").splitlines()[-1])
+        errors = read_json(run / ERRORS, what="errors of a training")
+        last = read_history(run)[-1]
         shapes, episodes = errors["unseen shapes"], errors["unseen episodes"]
         return Ablation(
             name,

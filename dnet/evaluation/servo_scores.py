@@ -1,12 +1,13 @@
 """What a servo run came to, read from its log alone: every figure follows from clouds in it."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from dnet.datasets.reader import EpisodeReader
+from dnet.errors import BadReport, TooLarge
+from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most
 from dnet.geometry.chamfer import chamfer, legacy_chamfer
 from dnet.geometry.node_distance import node_distance
 
@@ -106,6 +107,14 @@ def _empty(goal: str, outcome: str) -> Score:
 def _turn_ms(path: Path) -> float:
     if not path.is_file():
         return float("nan")
-    turns = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     stages = ("observe", "predict", "plan", "log")
-    return float(np.median([sum(turn[name] for name in stages) for turn in turns] or [np.nan]))
+    try:
+        content = read_at_most(path, LARGEST_JSON, what="latencies").decode("utf-8")
+        turns = [parse_json(line) for line in content.splitlines()]
+        times = [sum(float(turn[name]) for name in stages) for turn in turns]
+    except TooLarge:
+        raise
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        way_out = "remove the run, and repeat it"
+        raise BadReport(path, f"is unreadable ({error!r})", way_out) from error
+    return float(np.median(times or [np.nan]))

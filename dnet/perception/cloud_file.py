@@ -13,6 +13,7 @@ import numpy as np
 
 from dnet.errors import BadCloudFile, MissingExtra, MissingPath
 from dnet.geometry.sampling import farthest_points
+from dnet.perception.cloud_claims import check_claims
 from dnet.types import Cloud
 
 EXTRA = "clouds"
@@ -36,6 +37,7 @@ def read_cloud(path: Path, *, points: int) -> Cloud:
         raise MissingPath(path, "cloud", "give a .npy, .ply or .pcd file")
     read = READERS[path.suffix.lower()]
     try:
+        check_claims(path)
         found = np.asarray(read(path))
     except (MissingExtra, OSError):
         raise
@@ -56,7 +58,10 @@ def _read_npy(path: Path) -> Any:
 
 
 def _read_ply(path: Path) -> Any:
-    return _package("trimesh", path).load(path, process=False).vertices
+    trimesh = _package("trimesh", path)
+    # From an open file, of which trimesh does not know where it lies: a .ply may name a picture.
+    with path.open("rb") as file:
+        return trimesh.load(file, file_type="ply", process=False, skip_materials=True).vertices
 
 
 def _read_pcd(path: Path) -> Any:

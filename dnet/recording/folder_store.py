@@ -10,7 +10,8 @@ from tempfile import TemporaryDirectory
 
 from filelock import FileLock, Timeout
 
-from dnet.errors import NoSpace, OccupiedOutput, OutputInUse, StoreFailed
+from dnet.errors import NoSpace, OccupiedOutput, OutputInUse, StoreFailed, TooLarge
+from dnet.file_sizes import LARGEST_JSON, read_at_most
 
 LOCK = ".recording.lock"
 APART = ".recording-"
@@ -78,9 +79,12 @@ class FolderStore:
 
         Raises:
             StoreFailed: If it cannot be read.
+            TooLarge: If it is larger than the manifest of any recording.
         """
         try:
-            return (self.folder / name).read_bytes()
+            return read_at_most(self.folder / name, LARGEST_JSON, what="file")
+        except TooLarge:
+            raise
         except OSError as error:
             raise StoreFailed(self.name, str(error)) from error
 

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from dnet.errors import BadManifest, DamagedEpisode, OccupiedOutput, OtherRequest
+from dnet.file_sizes import parse_json
 from dnet.recording.pair import PairReport, manifest_entry
 from dnet.recording.request import RecordingRequest, differences
 from dnet.recording.store import Store
@@ -118,9 +119,10 @@ def read_manifest(store: Store) -> dict[str, Any]:
     Raises:
         BadManifest: If it does not say what was recorded.
         StoreFailed: If there is none.
+        TooLarge: If it is larger than that of any recording.
     """
     try:
-        content: dict[str, Any] = json.loads(store.read(MANIFEST))
+        content: dict[str, Any] = parse_json(store.read(MANIFEST))
         version = content["version"]
         if version != VERSION:
             raise ValueError(f"it has version {version}, this dnet writes {VERSION}")

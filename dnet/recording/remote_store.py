@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 from dnet.datasets.sources import said
 from dnet.datasets.stores import S3, file_system
-from dnet.errors import NoSpace, StoreFailed, UnknownStore
+from dnet.errors import NoSpace, StoreFailed, TooLarge, UnknownStore
+from dnet.file_sizes import LARGEST_JSON
 
 BUCKETS = (*S3, "gs", "gcs", "abfs", "abfss", "az")
 """Stores in which a folder is but the beginning of a name; to make one could make a bucket."""
@@ -94,10 +95,16 @@ class RemoteStore:
 
         Raises:
             StoreFailed: If there is none, or the store does not answer.
+            TooLarge: If it is larger than the manifest of any recording.
         """
         files, path = self._place
         try:
+            size = files.info(f"{path}/{name}")["size"]
+            if size > LARGEST_JSON:
+                raise TooLarge("file", f"{self.name}/{name}", size, LARGEST_JSON)
             content: bytes = files.cat_file(f"{path}/{name}")
+        except TooLarge:
+            raise
         except Exception as error:
             raise StoreFailed(self.name, said(error)) from error
         return content

@@ -1,6 +1,7 @@
 """Trained networks on disk: safetensors for the weights, JSON for all else, never a pickle."""
 
 import json
+import struct
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,7 +12,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as save_tensors
 from torch import Tensor
 
-from dnet.errors import BadCheckpoint
+from dnet.errors import BadCheckpoint, TooLarge
+from dnet.file_sizes import parse_json
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
 from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.nets.keypoints import KeypointNet
@@ -25,6 +27,14 @@ N = TypeVar("N", bound=Network)
 
 BEST = "best.safetensors"
 """The file that stands for a run directory: the network with the smallest validation error."""
+
+LARGEST_CHECKPOINT = 2**30
+"""Bytes of a file that are still read; the largest network here has 7 MB, and four times that with
+all that a training goes on from."""
+LARGEST_HEADER = 16 * 2**20
+"""Bytes of what a file says of its tensors; dnet writes 20 KB. Parsed, it takes many times that."""
+
+_LENGTH = struct.Struct("<Q")
 
 # One entry of the header for all: safetensors writes several in a random order, and the same
 # network should give the same bytes.
@@ -66,6 +76,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt.
+        TooLarge: If it is larger than any network.
     """
     return _read(path)
 
@@ -78,6 +89,7 @@ def load(path: Path) -> DeformerNet:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+        TooLarge: If it is larger than any network.
     """
     return load_kind(path, DeformerNet)
 
@@ -91,6 +103,7 @@ def load_kind(path: Path, kind: type[N]) -> N:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+        TooLarge: If it is larger than any network.
     """
     network = load_any(path)
     if not isinstance(network, kind):
@@ -104,6 +117,7 @@ def load_any(path: Path) -> Network:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of an unknown network.
+        TooLarge: If it is larger than any network.
     """
     file = weights_file(path)
     header, weights = _read(file)
@@ -129,6 +143,7 @@ def begin_with(model: Network, path: Path) -> None:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt, or of another network.
+        TooLarge: If it is larger than any network.
     """
     held = load_any(path)
     alike = type(held) is type(model)
@@ -155,6 +170,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
 
     Raises:
         BadCheckpoint: If there is no such file, or it is corrupt.
+        TooLarge: If it is larger than any network.
     """
     header, _ = _read(weights_file(path))
     metrics = header.get("metrics")
@@ -180,16 +196,35 @@ def weights_file(path: Path) -> Path:
 
 def _read(file: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     try:
+        _check_sizes(file)
         with safe_open(file, framework="pt", device="cpu") as content:
             text = (content.metadata() or {}).get(_KEY, "{}")
             weights = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
+    except TooLarge:
+        raise
     except (SafetensorError, OSError, ValueError) as error:
         raise BadCheckpoint(file, f"is not a whole safetensors file ({error})", _HINT) from error
     try:
-        header = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        header = parse_json(text)
+    except ValueError as error:
         raise BadCheckpoint(file, f"has an unreadable header ({error})", _HINT) from error
     return header if isinstance(header, dict) else {}, weights
+
+
+def _check_sizes(file: Path) -> None:
+    """Refuse a file that would take more memory than a network can.
+
+    Raises:
+        TooLarge: If it has too many bytes, or its header has.
+    """
+    size = file.stat().st_size
+    if size > LARGEST_CHECKPOINT:
+        raise TooLarge("checkpoint", file, size, LARGEST_CHECKPOINT)
+    with file.open("rb") as opened:
+        (header,) = _LENGTH.unpack(opened.read(_LENGTH.size).ljust(_LENGTH.size, b"\0"))
+    # Of a file that is none the first bytes say anything.
+    if LARGEST_HEADER < header < size:
+        raise TooLarge("header of the checkpoint", file, header, LARGEST_HEADER)
 
 
 def config_of(file: Path, fields: Any) -> DeformerNetConfig:

@@ -7,7 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
 
-from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream
+from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream, TooLarge
+from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most, read_json
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
 from dnet.training.objectives import Network
 from dnet.training.progress import EpochDone
@@ -126,12 +127,14 @@ class RunWriter:
         before = read_config(self.path)
         for part in ("network", "training", "data"):
             for name, value in self.content[part].items():
-                if name not in EXTENSIBLE and before.get(part, {}).get(name) != value:
-                    raise OtherRun(self.path, name, before.get(part, {}).get(name), value)
+                held = before[part] if isinstance(before.get(part), dict) else {}
+                if name not in EXTENSIBLE and held.get(name) != value:
+                    raise OtherRun(self.path, name, held.get(name), value)
         facts, tensors = read_tensors(self.path / STATE)
-        lines = (self.path / METRICS).read_text(encoding="utf-8") if facts["epochs"] else ""
+        if type(facts.get("epochs")) is not int or facts["epochs"] < 0:
+            raise BadCheckpoint(self.path / STATE, "does not say how far it is", "train anew")
         # Epochs since then come again, and come out the same.
-        self.history = [json.loads(line) for line in lines.splitlines()[: facts["epochs"]]]
+        self.history = read_history(self.path)[: facts["epochs"]] if facts["epochs"] else []
         self._state = facts, tensors
 
     def _write_history(self) -> None:
@@ -156,10 +159,27 @@ def main_scores(errors: Mapping[str, Any]) -> Mapping[str, Any]:
 def is_finished(run: Path) -> bool:
     """Return whether the training in a directory has come to its end."""
     try:
-        last = (run / METRICS).read_text(encoding="utf-8").splitlines()[-1]
-        return (run / ERRORS).exists() and json.loads(last)["progress"] >= 1
-    except (OSError, ValueError, KeyError, IndexError):
+        last = read_history(run)[-1]
+        return (run / ERRORS).exists() and last["progress"] >= 1
+    except (BadCheckpoint, KeyError, TypeError, IndexError):
         return False
+
+
+def read_history(run: Path) -> list[dict[str, Any]]:
+    """Return what was written down of each epoch of the training in a directory.
+
+    Raises:
+        BadCheckpoint: If that cannot be read.
+        TooLarge: If it is longer than any training.
+    """
+    file = run / METRICS
+    try:
+        content = read_at_most(file, LARGEST_JSON, what="history")
+        return [parse_json(line) for line in content.decode("utf-8").splitlines()]
+    except TooLarge:
+        raise
+    except (OSError, ValueError) as error:
+        raise BadCheckpoint(file, f"is unreadable ({error})", "train it again") from error
 
 
 def read_config(run: Path) -> dict[str, Any]:
@@ -169,13 +189,16 @@ def read_config(run: Path) -> dict[str, Any]:
 
     Raises:
         BadCheckpoint: If the directory holds no config, or a corrupt one.
+        TooLarge: If it is larger than any config.
     """
     file = run / CONFIG
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = read_json(file, what="config")
+    except TooLarge:
+        raise
     except FileNotFoundError as error:
         raise BadCheckpoint(file, "does not exist", "give a run of `dnet train`") from error
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise BadCheckpoint(file, f"is unreadable ({error})", "train it again") from error
     if not isinstance(content, dict):
         raise BadCheckpoint(file, "is not a JSON object", "train it again")

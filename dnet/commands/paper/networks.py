@@ -1,6 +1,5 @@
 """The experiment `networks`: errors of DeformerNet and of Hu et al., as their trainings say."""
 
-import json
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -15,6 +14,7 @@ from dnet.evaluation.report.asked import read_asked, write_asked
 from dnet.evaluation.report.networks_section import ARCHITECTURE
 from dnet.evaluation.report.published import GRASP_CASES
 from dnet.evaluation.report.trainings import CONFIG, ERRORS, SHIPPED, SHIPPED_HU
+from dnet.file_sizes import read_json
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.training.checkpoints import load, load_any, weights_file, write_json
 from dnet.training.division import divide, thinned
@@ -68,7 +68,7 @@ def _copy(run: Path, folder: Path) -> None:
     """Keep what a training says of itself: the report is made from its own directory alone."""
     folder.mkdir(parents=True, exist_ok=True)
     for name in (CONFIG, ERRORS):
-        write_json(folder / name, json.loads((run / name).read_text(encoding="utf-8")))
+        write_json(folder / name, read_json(run / name, what="description of a training"))
 
 
 def _judge(

@@ -6,7 +6,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dnet.errors import BadReport
+from dnet.errors import BadName, BadReport, TooLarge
+from dnet.file_sizes import read_json
+from dnet.plain_names import plain_path
 
 ASKED = "asked.json"
 
@@ -51,14 +53,21 @@ def read_asked(folder: Path) -> Asked | None:
 
     Raises:
         BadReport: If that cannot be read.
+        BadName: If it names a run that is not in that directory.
+        TooLarge: If it is larger than any of its kind.
     """
     path = folder / ASKED
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        runs = {method: tuple(names) for method, names in content.pop("runs").items()}
+        content = read_json(path, what="order of an experiment")
+        runs = {
+            method: tuple(str(plain_path(name, what=f"a run in {path}")) for name in names)
+            for method, names in content.pop("runs").items()
+        }
         return Asked(**content, runs=runs)
     except FileNotFoundError:
         return None
+    except (BadName, TooLarge):
+        raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         way_out = f"remove {folder}, and run it again"
         raise BadReport(path, f"is unreadable ({error!r})", way_out) from error

@@ -1,6 +1,5 @@
 """DeformerNet against the network of Hu et al.: losses on many shapes and on a few."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from dnet.evaluation.report.asked import Asked
 from dnet.evaluation.report.published import TEST_MSE_MM2, TRAIN_MSE_MM2
 from dnet.evaluation.report.trainings import Errors, Training, read_trainings
 from dnet.evaluation.report.values import Bar, BarPlot, Cell, Claim, Column, Section, Sheet
+from dnet.file_sizes import read_json
 
 ARCHITECTURE = "architecture.json"
 PARTS = ("training", "unseen shapes", "unseen episodes")
@@ -123,7 +123,7 @@ def _architecture(folder: Path, asked: Asked | None) -> Claim:
     if asked is None:
         return Claim("figure 1", what, paper, "", None, "not run")
     try:
-        counts = json.loads(path.read_text(encoding="utf-8"))
+        counts = read_json(path, what="table of networks")
     except (OSError, ValueError) as error:
         raise BadReport(path, f"is unreadable ({error!r})", "run the experiment again") from error
     ours = f"{counts['paper']:,} weights with --size paper, {counts['shipped']:,} in what ships"

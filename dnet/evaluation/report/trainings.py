@@ -1,12 +1,12 @@
 """Trainings that an experiment was given: what each is of, and its errors, as it wrote them."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadReport
+from dnet.file_sizes import read_json
 
 CONFIG, ERRORS = "config.json", "errors.json"
 """Names of a training's own files: copies of them are kept with the experiment."""
@@ -76,8 +76,8 @@ def read_training(run: Path) -> Training:
         BadReport: If it cannot be read.
     """
     try:
-        errors = json.loads((run / ERRORS).read_text(encoding="utf-8"))
-        config = json.loads((run / CONFIG).read_text(encoding="utf-8"))
+        errors = read_json(run / ERRORS, what="errors of a training")
+        config = read_json(run / CONFIG, what="config of a training")
         network, learned = config["network"], config["training"]
         few = learned.get("episodes") is not None
         return Training(
