@@ -1,10 +1,12 @@
 """Arrays that are computed from an episode once, and kept beside the data by its content."""
 
 import os
+import struct
+import zlib
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ FOLDER = ".cache"
 Records = NDArray[Any]
 """A structured array, a record a frame."""
 
+_SUM = struct.Struct("<I")
+
 
 @dataclass(frozen=True)
 class TableCache:
@@ -32,18 +36,27 @@ class TableCache:
     version: str
     """Everything that they depend on besides the episode: another version, other records."""
 
-    def find(self, digest: str, dtype: np.dtype[Any]) -> Records | None:
+    def find(self, digest: str, dtype: np.dtype[Any], *, checked: bool = False) -> Records | None:
         """Return the records of an episode, mapped; None if they are not there, or not whole.
 
         Args:
             digest: SHA-256 of the episode's file.
             dtype: Of the records.
+            checked: Whether to read all of them first, and see that none has changed.
         """
+        path = self._path(digest)
         try:
-            records = np.load(self._path(digest), mmap_mode="r", allow_pickle=False)
+            records = cast("np.memmap", np.load(path, mmap_mode="r", allow_pickle=False))
+            if records.dtype != dtype or records.ndim != 1:
+                return None
+            with path.open("rb") as file:
+                place = file.seek(-_SUM.size, os.SEEK_END)
+                (told,) = _SUM.unpack(file.read(_SUM.size))
         except (OSError, ValueError, EOFError):
             return None
-        return records if records.dtype == dtype and records.ndim == 1 else None
+        if place != records.offset + records.nbytes or (checked and told != _sum(records)):
+            return None
+        return records
 
     def put(self, digest: str, records: Records) -> None:
         """Keep the records of an episode.
@@ -59,6 +72,8 @@ class TableCache:
             try:
                 with part.open("wb") as file:
                     np.save(file, records, allow_pickle=False)
+                    # Behind the records, where numpy does not look.
+                    file.write(_SUM.pack(_sum(records)))
                 part.replace(path)
             finally:
                 part.unlink(missing_ok=True)
@@ -69,6 +84,10 @@ class TableCache:
         version = sha256(self.version.encode()).hexdigest()[:16]
         plain_name(digest, what="the SHA-256 of an episode")
         return self.folder / f"{self.kind}-{version}" / f"{digest}.npy"
+
+
+def _sum(records: Records) -> int:
+    return zlib.crc32(np.ascontiguousarray(records).view(np.uint8))
 
 
 def cache_folder(root: Place) -> Path:

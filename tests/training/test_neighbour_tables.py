@@ -91,13 +91,28 @@ def test_a_cut_off_table_is_found_anew(tmp_path: Path) -> None:
     assert path.read_bytes() == whole
 
 
+@pytest.mark.parametrize("place", [-6, -60, -600])
+def test_a_changed_table_is_found_anew(tmp_path: Path, place: int) -> None:
+    tables = NeighbourTables(table_of(tmp_path, 0), SMALL)
+    tables.build()
+    (path,) = files(tmp_path)
+    whole = path.read_bytes()
+    changed = bytearray(whole)
+    changed[place] ^= 1
+    path.write_bytes(changed)
+    tables.build()
+    assert path.read_bytes() == whole
+
+
 def test_a_row_beyond_the_cloud_is_refused(tmp_path: Path) -> None:
     tables = NeighbourTables(table_of(tmp_path, 0), SMALL)
     tables.build()
     (path,) = files(tmp_path)
     records = np.load(path)
     records["samplings"]["neighbours_1"][0, 0, 5, 2] = SMALL.points
-    np.save(path, records)
+    with path.open("wb") as file:
+        np.save(file, records)
+        file.write(bytes(4))
     with pytest.raises(BadTables, match="beyond its cloud"):
         first(tables, BoxEpisode(0))
 
