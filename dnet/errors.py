@@ -35,6 +35,16 @@ class LongCloud(DnetError, ValueError):
         )
 
 
+class HugeCloud(DnetError, ValueError):
+    """A file with more points, or more bytes, than are read at a time."""
+
+    def __init__(self, path: Path, what: str, got: int, most: int) -> None:
+        super().__init__(
+            f"{path} says that it holds {got} {what}, at most {most} are read; if it is a cloud, "
+            "leave out points first: a network takes some thousands"
+        )
+
+
 class BadCloud(DnetError, ValueError):
     """A cloud with coordinates that are not numbers."""
 

@@ -14,6 +14,7 @@ import numpy as np
 from dnet.errors import BadCloudFile, MissingExtra, MissingPath
 from dnet.geometry.sampling import farthest_points
 from dnet.perception.cloud_claims import check_claims
+from dnet.perception.huge_clouds import refuse_huge
 from dnet.types import Cloud
 
 EXTRA = "clouds"
@@ -31,11 +32,13 @@ def read_cloud(path: Path, *, points: int) -> Cloud:
     Raises:
         MissingPath: If there is no such file.
         BadCloudFile: If it is no cloud, or has too few points.
+        HugeCloud: If it has too many to be read, or says so.
         MissingExtra: If the package that reads it is not installed.
     """
     if not path.is_file():
         raise MissingPath(path, "cloud", "give a .npy, .ply or .pcd file")
     read = READERS[path.suffix.lower()]
+    refuse_huge(path)
     try:
         check_claims(path)
         found = np.asarray(read(path))
