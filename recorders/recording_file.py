@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +10,11 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from dnet.errors import Unwritten
 from dnet.recorders.streams import open_stream, save_stream
+
+RESERVE = 32_000_000
+"""Bytes that must be free for a recording to be begun."""
 
 
 @contextmanager
@@ -27,8 +32,12 @@ def recording_file(
         application: Of which all recordings are shown in one layout.
         name: What the viewer calls it.
         blueprint: The layout.
+
+    Raises:
+        Unwritten: If the disk is nearly full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
+    _check_room(path.parent)
     part = path.with_name(path.name + ".part")
     recording = open_stream(
         application,
@@ -51,3 +60,11 @@ def recording_file(
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def _check_room(folder: Path) -> None:
+    """Refuse a disk that is nearly full: Rerun would wait there for ever, and say nothing."""
+    free = shutil.disk_usage(folder).free
+    if free < RESERVE:
+        why = f"{free / 1e6:.1f} MB are free, a recording may take {RESERVE / 1e6:.0f} MB"
+        raise Unwritten(folder, why)

@@ -165,7 +165,8 @@ def test_a_killed_training_leaves_a_network_and_begins_again(
     process = begun(episodes, tmp_path / "run")
     process.kill()
     process.communicate()
-    assert load(tmp_path / "run").config.points == POINTS
+    for name in ("best", "last"):
+        assert load(tmp_path / "run" / f"{name}.safetensors").config.points == POINTS
     Train(from_mcap=episodes, out=tmp_path / "run", epochs=60, resume=True).run()
     assert [line["epoch"] for line in untimed(tmp_path / "run")] == list(range(1, 61))
 

@@ -1,0 +1,82 @@
+"""A process that works for another and is killed: said in one line, nothing finished is lost."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import psutil
+import pytest
+
+from dnet.datasets.index import FRAMES, open_index
+from dnet.datasets.loading import Share, load_groups
+from dnet.errors import WorkerDied
+from dnet.laboratory import LaboratorySettings
+from dnet.training.neighbour_tables import NeighbourTables
+from dnet.trials.batch import missing, run_trials
+from dnet.trials.request import Trial
+from tests.recorders import rollout
+from tests.training.deforming_box import SMALL
+from tests.training.test_neighbour_tables import table_of
+
+
+def kill_a_worker() -> None:
+    """Kill one of the processes that this one works with."""
+    children = psutil.Process().children(recursive=True)
+    workers = [one for one in children if "spawn_main" in " ".join(one.cmdline())]
+    workers[0].kill()
+
+
+def write(folder: Path, count: int) -> Path:
+    seen = rollout.frames(3, points=64)
+    for number in range(count):
+        rollout.write(folder / f"episode-{number:03d}.mcap", seen)
+    return folder
+
+
+def test_a_dead_reader_of_logs_leaves_no_index_and_the_next_call_makes_it(tmp_path: Path) -> None:
+    write(tmp_path, 60)
+
+    def kill_at_the_first(done: int, _total: int) -> None:
+        if done == 1:
+            kill_a_worker()
+
+    with pytest.raises(WorkerDied, match=r"read the logs in .* was killed.*run the same command"):
+        open_index(tmp_path, workers=2, on_file=kill_at_the_first)
+    assert not (tmp_path / FRAMES).exists()
+    assert open_index(tmp_path, workers=1).files.height == 60
+
+
+def test_a_dead_loader_worker_ends_the_stream_by_name(tmp_path: Path) -> None:
+    stream = load_groups(write(tmp_path, 3), share=Share(workers=1))
+    batches = iter(stream)
+    next(batches)
+    kill_a_worker()
+    with pytest.raises(WorkerDied, match=r"read ahead was killed.*fewer --workers"):
+        list(batches)
+    again = load_groups(tmp_path)
+    again.load_state_dict(stream.state_dict())
+    assert list(again)
+
+
+def test_a_dead_describer_of_clouds_keeps_what_it_found(tmp_path: Path) -> None:
+    tables = NeighbourTables(table_of(tmp_path, *range(12)), SMALL)
+    with pytest.raises(WorkerDied, match="described the clouds"):
+        tables.build(workers=2, on_clouds=lambda _: kill_a_worker())
+    assert list(tmp_path.rglob("*.npy"))
+    tables.build()
+    assert len(list(tmp_path.rglob("*.npy"))) == 12
+
+
+def test_a_dead_evaluation_job_keeps_the_finished_runs(tmp_path: Path) -> None:
+    lab = LaboratorySettings(points=512, world="quasistatic")
+    plain = Trial("", tmp_path, controller="oracle", laboratory=lab, recording=False)
+    asked = [replace(plain, goal=f"random:{n}", out=tmp_path / f"{n}") for n in range(4)]
+    reports = run_trials(asked, jobs=2, stop=bool)
+    first = next(iter(reports))
+    kill_a_worker()
+    with pytest.raises(WorkerDied, match=r"servoed into .* was killed.*fewer --jobs"):
+        list(reports)
+    left = missing(asked)
+    assert first.trial not in left
+    assert left
+    list(run_trials(left, jobs=1, stop=bool))
+    assert missing(asked) == []
