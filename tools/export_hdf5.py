@@ -1,5 +1,6 @@
 """A dataset as one HDF5 file, a group an episode, its arrays contiguous."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 
 from dnet.datasets.index import Index
 from dnet.datasets.reader import SCHEMA_VERSION
-from dnet.errors import MissingExtra
+from dnet.errors import MissingExtra, Unwritten
 from dnet.tools.exported_episode import exported_episodes
 from dnet.tools.exported_output import Exported, finished_output
 
@@ -39,7 +40,7 @@ def export_hdf5(
     """
     h5py = _h5py()
     episodes = frames = 0
-    with finished_output(out) as part, h5py.File(part, "w") as file:
+    with finished_output(out) as part, h5py.File(_with_room(part, index), "w") as file:
         file.attrs["schema_version"] = SCHEMA_VERSION
         for episode in exported_episodes(index, on_episode):
             group = file.create_group(episode.name)
@@ -48,6 +49,18 @@ def export_hdf5(
             episodes += 1
             frames += len(episode)
     return Exported(out, episodes, frames)
+
+
+def _with_room(part: Path, index: Index) -> Path:
+    """Refuse a disk that may fill up: HDF5 does not survive that, the process would crash.
+
+    The logs hold all that is exported, and more.
+    """
+    need, free = int(index.files["bytes"].sum()), shutil.disk_usage(part.parent).free
+    if need > free:
+        why = f"{free / 1e6:.1f} MB are free, the export may take {need / 1e6:.1f} MB"
+        raise Unwritten(part.parent, why)
+    return part
 
 
 def _h5py() -> Any:

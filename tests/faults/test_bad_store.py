@@ -71,6 +71,7 @@ def test_writing_outlasts_a_fault_that_passes(
     assert RemoteStore(url).read("episode-0.mcap") == content
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["reset", "error", "garbage", "silent"])
 def test_a_store_that_stays_bad_is_given_up_by_name_and_the_episode_stays(
     store: BadStore, bucket: str, tmp_path: Path, fault: Fault

@@ -55,6 +55,7 @@ def work(folder: str) -> None:
     assert 3 < time.monotonic() - clock < 120
 
 
+@pytest.mark.slow
 def test_recording_servoing_and_a_time_limit_go_by_other_clocks(tmp_path: Path) -> None:
     compiler = shutil.which("cc")
     if compiler is None:

@@ -57,6 +57,7 @@ def test_a_dead_loader_worker_ends_the_stream_by_name(tmp_path: Path) -> None:
     assert list(again)
 
 
+@pytest.mark.slow
 def test_a_dead_describer_of_clouds_keeps_what_it_found(tmp_path: Path) -> None:
     tables = NeighbourTables(table_of(tmp_path, *range(12)), SMALL)
     with pytest.raises(WorkerDied, match="described the clouds"):
@@ -66,6 +67,7 @@ def test_a_dead_describer_of_clouds_keeps_what_it_found(tmp_path: Path) -> None:
     assert len(list(tmp_path.rglob("*.npy"))) == 12
 
 
+@pytest.mark.slow
 def test_a_dead_evaluation_job_keeps_the_finished_runs(tmp_path: Path) -> None:
     lab = LaboratorySettings(points=512, world="quasistatic")
     plain = Trial("", tmp_path, controller="oracle", laboratory=lab, recording=False)

@@ -37,11 +37,8 @@ def filled(place: Path, sign: Path, *, lines: int = 0, left: int = LEFT) -> Iter
         while not (sign.exists() and sign.read_bytes().count(b"\n") >= lines):
             time.sleep(0.001)
         disk = os.statvfs(place)
-        os.posix_fallocate(
-            os.open(place / "filler", os.O_CREAT | os.O_WRONLY),
-            0,
-            max(1, disk.f_bavail * disk.f_frsize - left),
-        )
+        with (place / "filler").open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, max(1, disk.f_bavail * disk.f_frsize - left))
 
     threading.Thread(target=fill, daemon=True).start()
     yield
@@ -70,6 +67,7 @@ def record_and_be_stopped(folder: str) -> None:
     assert json.loads((data / "manifest.json").read_text())["finished"]
 
 
+@pytest.mark.slow
 def test_a_recording_keeps_what_was_finished_and_goes_on(tmp_path: Path) -> None:
     elsewhere(record_and_be_stopped, tmp_path, mount=small_disk(tmp_path, "16M"))
 
@@ -91,6 +89,7 @@ def train_and_be_stopped(folder: str) -> None:
     assert (run / "errors.json").exists()
 
 
+@pytest.mark.slow
 def test_a_training_keeps_its_networks_and_goes_on(tmp_path: Path) -> None:
     elsewhere(train_and_be_stopped, tmp_path, mount=small_disk(tmp_path, "64M"))
 
@@ -109,6 +108,7 @@ def servo_and_be_stopped(folder: str) -> None:
     assert not list(run.glob("*.part"))
 
 
+@pytest.mark.slow
 def test_a_servo_run_ends_whole_by_that_name(tmp_path: Path) -> None:
     elsewhere(servo_and_be_stopped, tmp_path, mount=small_disk(tmp_path, "64M"))
 
@@ -117,7 +117,7 @@ def export_and_be_refused(folder: str, source: str) -> None:
     place = Path(folder)
     for to in ("npz", "parquet", "hdf5", "lerobot"):
         asked = ["inspect", "export", source, "--to", to, "--out", str(place / "out")]
-        assert "No space left on device" in refusal(*asked)
+        assert f"nothing can be written into {place}: " in refusal(*asked)
         assert not list(place.iterdir())
     for words in (["plot", source, "--out"], ["stats", source, "--plot"]):
         line = refusal("inspect", *words, str(place / "picture.png"))

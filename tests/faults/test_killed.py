@@ -63,6 +63,7 @@ def test_a_killed_recording_goes_on_to_the_bytes_of_an_undisturbed_one(tmp_path:
     assert contents(data) == contents(tmp_path / "undisturbed")
 
 
+@pytest.mark.slow
 def test_a_killed_servo_run_keeps_its_steps_and_a_batch_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -70,7 +71,7 @@ def test_a_killed_servo_run_keeps_its_steps_and_a_batch_goes_on(
     goals.mkdir()
     main(["record", str(goals), "--pairs", "2", "--shapes", "1", *QUICK])
     asked = ["servo", "--goals", str(goals), "--out", str(runs), "--controller", "rrt", *QUICK]
-    asked += ["--steps", "25", "--chamfer", "0"]
+    asked += ["--steps", "8", "--chamfer", "0"]
     first, second = (runs / f"episode-0-0000{number}" for number in range(2))
     steps = second / "latency.jsonl"
     killed(

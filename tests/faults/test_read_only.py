@@ -52,6 +52,7 @@ def write_nothing(folder: str, writable: str) -> None:
     assert {path: path.stat().st_mtime_ns for path in place.rglob("*")} == before
 
 
+@pytest.mark.slow
 def test_each_command_names_it_and_a_training_reads_it(tmp_path: Path) -> None:
     data, place = tmp_path / "data", tmp_path / "place"
     for number in range(3):
