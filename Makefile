@@ -30,7 +30,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo reproduce test slow check format lint type layers docs benchmark build clean
+.PHONY: help setup develop libraries demo reproduce test slow coverage check format lint type layers docs benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -76,6 +76,12 @@ test: develop ## Run the checks and the tests
 
 slow: develop ## Run the tests that take minutes each, which `make test` leaves out
 	$(BIN)/python -m pytest -m slow
+
+coverage: develop ## Run the tests and say which lines of the code they never reach
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
 
 check: lint type layers docs ## Run the static checks
 

@@ -29,7 +29,7 @@ def open_stream(
 
 def save_stream(stream: rr.RecordingStream, path: Path, *, blueprint: rrb.Blueprint | None) -> None:
     """Write what is logged from now on to a file, with a layout for the application."""
-    with _in_memory(blueprint, stream.get_application_id()) as layout:
+    with _in_memory(blueprint, rr.get_application_id(stream)) as layout:
         rerun_bindings.save(str(path), layout, stream.to_native())
 
 
@@ -37,7 +37,7 @@ def send_stream(
     stream: rr.RecordingStream, *sinks: rr.FileSink | rr.GrpcSink, blueprint: rrb.Blueprint
 ) -> None:
     """Send what is logged from now on to several places, with a layout for the application."""
-    with _in_memory(blueprint, stream.get_application_id()) as layout:
+    with _in_memory(blueprint, rr.get_application_id(stream)) as layout:
         rerun_bindings.set_sinks([*sinks], layout, stream.to_native())
 
 

@@ -1,6 +1,7 @@
 """One round of everyday work: record in both worlds, check, train, servo in both worlds."""
 
 from pathlib import Path
+from typing import Literal
 
 from dnet.commands.inspect_validate import Validate
 from dnet.commands.record import Record
@@ -30,7 +31,8 @@ def work(folder: Path, *, number: int) -> None:
     Record(bullet, pairs=1, shapes=2, seed=number, points=POINTS, images=True).run()
     Validate((soft, bullet)).run()
     ToTheEnd(Train(soft, network, epochs=3, seed=number)).run()
-    for world, data in (("quasistatic", soft), ("bullet", bullet)):
+    worlds: dict[Literal["quasistatic", "bullet"], Path] = {"quasistatic": soft, "bullet": bullet}
+    for world, data in worlds.items():
         options = ServoOptions(checkpoint=network, steps=2, world=world, seed=number)
         goal = data / f"episode-{number}-00000.mcap"
         Servo(folder / f"servo-{world}", goal=str(goal), options=options).run()
