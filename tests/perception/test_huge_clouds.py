@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dnet.errors import HugeCloud
-from dnet.perception.huge_clouds import MOST_BYTES, MOST_POINTS
 from dnet.perception.cloud_file import read_cloud
+from dnet.perception.huge_clouds import MOST_BYTES, MOST_POINTS
 
 HUGE = 10**12
 
