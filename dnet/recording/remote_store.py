@@ -2,10 +2,12 @@
 
 import shutil
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
+from threading import Thread
 from time import sleep
 from typing import Any, TypeVar
 
@@ -18,6 +20,9 @@ BUCKETS = (*S3, "gs", "gcs", "abfs", "abfss", "az")
 """Stores in which a folder is but the beginning of a name; to make one could make a bucket."""
 LASTING = (FileNotFoundError, PermissionError, NotImplementedError)
 """Failures that do not pass: no such bucket, no leave to write, a store to read from only."""
+
+SLOWEST = 50_000
+"""Bytes that at least go to a store in a second."""
 
 _Value = TypeVar("_Value")
 
@@ -41,6 +46,10 @@ class RemoteStore:
     """Its URL, without a slash at the end."""
     pauses: tuple[float, ...] = (1.0, 5.0, 25.0)
     """Seconds before each further try to write, besides the tries of the store's own client."""
+
+    patience: float = 120.0
+    """Seconds for each try, and `SLOWEST` for what is sent: clients may wait for ever for the word
+    to go on."""
 
     def __post_init__(self) -> None:
         """Refuse what is no store before anything is recorded."""
@@ -116,7 +125,7 @@ class RemoteStore:
             StoreFailed: If no try succeeds.
         """
         files, path = self._place
-        self._insist(lambda: files.pipe_file(f"{path}/{name}", content))
+        self._insist(lambda: files.pipe_file(f"{path}/{name}", content), size=len(content))
 
     def append(self, name: str, line: str) -> None:
         """Add a line to a file by writing all of it anew: a store's files do not grow.
@@ -163,7 +172,7 @@ class RemoteStore:
             if arrived != size:
                 raise OSError(f"{arrived} of {size} bytes of {path.name} arrived")
 
-        self._insist(upload)
+        self._insist(upload, size=size)
         path.unlink()
 
     @property
@@ -171,15 +180,39 @@ class RemoteStore:
         """The store's fsspec file system, which fsspec keeps for each process, and our path."""
         return file_system(self.name, doing="writing to")
 
-    def _insist(self, action: Callable[[], _Value]) -> _Value:
-        """Do what may fail for a while, again after each pause."""
-        pauses = iter(self.pauses)
+    def _insist(self, action: Callable[[], _Value], *, size: int = 0) -> _Value:
+        """Do what may fail for a while, again after each pause, or may never come to an end."""
+        pauses, seconds = iter(self.pauses), self.patience + size / SLOWEST
         while True:
             try:
-                return action()
+                return _within(seconds, action)
             # Stores raise what they like: botocore's errors are not even OSErrors.
             except Exception as error:
                 pause = None if isinstance(error, LASTING) else next(pauses, None)
                 if pause is None:
                     raise StoreFailed(self.name, said(error)) from error
             sleep(pause)
+
+
+def _within(seconds: float, action: Callable[[], _Value]) -> _Value:
+    """Return what an action returns, or leave it behind when its time is over.
+
+    Raises:
+        TimeoutError: If it is not done by then.
+        Exception: What it raises.
+    """
+    done: Future[_Value] = Future()
+
+    def act() -> None:
+        try:
+            done.set_result(action())
+        except BaseException as error:
+            done.set_exception(error)
+
+    Thread(target=act, daemon=True).start()
+    try:
+        return done.result(seconds)
+    except TimeoutError as error:
+        if done.done():
+            raise
+        raise TimeoutError(f"no answer within {seconds:.0f} s") from error

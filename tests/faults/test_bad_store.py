@@ -81,7 +81,7 @@ def test_a_store_that_stays_bad_is_given_up_by_name_and_the_episode_stays(
     url = f"{bucket}/gone-{fault}"
     clock = time.monotonic()
     with pytest.raises(StoreFailed, match=f"{url} fails: .*finished episodes are kept"):
-        RemoteStore(url, pauses=()).keep(path)
+        RemoteStore(url, pauses=(0.1,), patience=5.0).keep(path)
     with pytest.raises(Unfetched, match=f"{url} cannot be read: "):
         open_index(url)
     assert path.exists()
