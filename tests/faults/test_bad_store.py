@@ -20,7 +20,7 @@ from tests.recorders import rollout
 from tests.recording import cloud
 
 FAULTS: tuple[Fault, ...] = ("slow", "truncated", "reset", "error", "garbage")
-IMPATIENT = {"read_timeout": 1, "connect_timeout": 1, "retries": {"max_attempts": 1}}
+IMPATIENT = {"read_timeout": 1, "connect_timeout": 1, "retries": {"max_attempts": 2}}
 
 
 @pytest.fixture(scope="module")
