@@ -1,15 +1,17 @@
 """A cloud that says that it is enormous is refused before anything is made of it."""
 
 import tracemalloc
+import zipfile
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dnet.errors import HugeCloud
+from dnet.errors import BadArrays, HugeCloud
 from dnet.perception.cloud_file import read_cloud
 from dnet.perception.huge_clouds import MOST_BYTES, MOST_POINTS
+from dnet.tools import imported_arrays
 
 HUGE = 10**12
 
@@ -62,3 +64,13 @@ def test_a_file_that_is_enormous_is_refused_whatever_it_says(tmp_path: Path) -> 
         file.truncate(MOST_BYTES + 1)
     with pytest.raises(HugeCloud, match=f"{MOST_BYTES + 1} bytes, at most {MOST_BYTES}"):
         read_cloud(path, points=64)
+
+
+def test_arrays_that_inflate_beyond_the_limit_are_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(imported_arrays, "LARGEST_ARRAYS", 10**6)
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("clouds.npy", npy((1, 10**6, 3)) + bytes(12 * 10**6))
+    with pytest.raises(BadArrays, match="bytes when unpacked, at most"):
+        imported_arrays.read_arrays(tmp_path / "a.npz")
