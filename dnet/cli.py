@@ -9,6 +9,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from dnet.commands.demo import Demo
+from dnet.commands.doctor import Doctor
 from dnet.commands.evaluate import Evaluate
 from dnet.commands.export import Export
 from dnet.commands.inspect import Inspect
@@ -30,7 +31,7 @@ learn from the logs, and drive the tissue to a goal shape.
 
 `dnet COMMAND --help` teaches each."""
 
-Command = Record | Train | Servo | Play | Inspect | Evaluate | Export | Reproduce | Demo
+Command = Record | Train | Servo | Play | Inspect | Evaluate | Export | Reproduce | Demo | Doctor
 COMMANDS: dict[str, type[Command]] = {
     "record": Record,
     "train": Train,
@@ -41,6 +42,7 @@ COMMANDS: dict[str, type[Command]] = {
     "export": Export,
     "reproduce": Reproduce,
     "demo": Demo,
+    "doctor": Doctor,
 }
 
 OF_THE_DISK = frozenset(

@@ -362,6 +362,15 @@ class MissingPackage(DnetError, ImportError):
         super().__init__(f"{what} needs {package}, which is not installed; {remedy}")
 
 
+class Unfit(DnetError, RuntimeError):
+    """A machine on which dnet does not work as it should."""
+
+    def __init__(self, abilities: list[str]) -> None:
+        super().__init__(
+            f"{', '.join(abilities)} will not work here; the table above says what mends that"
+        )
+
+
 class MissingExtra(DnetError, ImportError):
     """A package that only some need, and that is not installed."""
 

@@ -1,0 +1,1 @@
+"""What this machine can do with dnet: tried, not guessed."""
