@@ -40,9 +40,13 @@ def start_viewer() -> str:
 
 def find_screen() -> str:
     """Find a screen to open a window on."""
+    from dnet.errors import NoScreen  # noqa: PLC0415
     from dnet.recorders.viewer_process import check_screen  # noqa: PLC0415
 
-    check_screen()
+    try:
+        check_screen()
+    except NoScreen:
+        raise RuntimeError("no screen: neither DISPLAY nor WAYLAND_DISPLAY is set") from None
     return "there is a screen"
 
 
