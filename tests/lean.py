@@ -9,13 +9,15 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 HIDING = """
 import sys
+from importlib.machinery import PathFinder
 
-class Nowhere:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {hidden!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+class WithoutThem(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        hidden = name.partition(".")[0] in {hidden!r}
+        return None if hidden else super().find_spec(name, path, target)
 
-sys.meta_path.insert(0, Nowhere())
+sys.meta_path[:] = [WithoutThem if one is PathFinder else one for one in sys.meta_path]
 """
 """Python runs a module of the name `sitecustomize` before anything else."""
 

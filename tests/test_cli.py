@@ -45,6 +45,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         ["inspect", "ls"],
         ["inspect", "info"],
         ["demo"],
+        ["doctor"],
         ["reproduce"],
         ["evaluate", "servo"],
     ],

@@ -13,13 +13,14 @@ class Ability:
     modules: tuple[str, ...]
     """What must be installed for it."""
     attempt: str
-    """A function of this package that does it once and says what came out, as in `module:name`."""
+    """A function that does it once and says what came out, as in `module:name`,
+    the module of this package unless it has a dot."""
     process: str
     """Attempts of one process share what they import; processes run beside each other."""
     needed: bool = True
     """Whether dnet is broken without; else it only lacks something."""
     thorough: str = ""
-    """Another function that takes seconds and does all of it, if there is one."""
+    """Another one that takes seconds and does all of it, if there is one."""
     remedy: str = ""
     """What mends it if everything is installed and it fails even so, if that is known."""
 
@@ -32,8 +33,20 @@ _DRAWING = (
 )
 
 ABILITIES = (
-    Ability("physics", ("record", "servo"), ("pybullet",), "laboratory_attempts:step", "physics"),
-    Ability("planning", ("record", "servo"), ("ompl",), "laboratory_attempts:plan", "physics"),
+    Ability(
+        "physics",
+        ("record", "servo"),
+        ("pybullet",),
+        "laboratory_attempts:step",
+        "physics",
+    ),
+    Ability(
+        "planning",
+        ("record", "servo"),
+        ("ompl",),
+        "laboratory_attempts:plan",
+        "physics",
+    ),
     Ability(
         "logs",
         ("record", "train", "servo", "inspect", "play"),
@@ -50,8 +63,20 @@ ABILITIES = (
         thorough="learning_attempts:predict_fused",
     ),
     Ability("training", ("train",), _NETWORKS, "learning_attempts:train", "networks"),
-    Ability("recordings", ("servo", "play"), ("rerun",), "showing_attempts:write", "showing"),
-    Ability("viewer", ("play",), ("rerun_cli",), "showing_attempts:start_viewer", "showing"),
+    Ability(
+        "recordings",
+        ("servo", "play"),
+        ("rerun",),
+        "showing_attempts:write",
+        "showing",
+    ),
+    Ability(
+        "viewer",
+        ("play",),
+        ("rerun_cli",),
+        "showing_attempts:start_viewer",
+        "showing",
+    ),
     Ability(
         "pictures",
         ("inspect", "evaluate", "play --film"),

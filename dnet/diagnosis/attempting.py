@@ -27,7 +27,8 @@ def main() -> None:
 def _tried(attempt: str) -> dict[str, str]:
     module, _, function = attempt.partition(":")
     try:
-        note: str = getattr(import_module(f"{__package__}.{module}"), function)()
+        whole = module if "." in module else f"{__package__}.{module}"
+        note: str = getattr(import_module(whole), function)()
     except Exception as error:  # whatever it is, it does not work
         return {"fails": " ".join(str(error).split()) or type(error).__name__}
     return {"works": note}

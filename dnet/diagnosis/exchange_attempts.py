@@ -2,23 +2,24 @@
 
 import io
 import tempfile
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 
 def read_clouds() -> str:
     """Write a cloud as .ply and .pcd, and read both as `dnet servo --goal` does."""
-    import trimesh  # noqa: PLC0415
-    from pypcd4 import PointCloud  # noqa: PLC0415
-
     from dnet.perception.cloud_file import read_cloud  # noqa: PLC0415
 
+    trimesh: Any = import_module("trimesh")
+    pypcd4: Any = import_module("pypcd4")
     cloud = np.random.default_rng(0).uniform(-0.05, 0.05, (64, 3)).astype(np.float32)
     with tempfile.TemporaryDirectory() as folder:
         ply, pcd = Path(folder) / "a.ply", Path(folder) / "a.pcd"
         trimesh.PointCloud(cloud).export(str(ply))
-        PointCloud.from_xyz_points(cloud).save(pcd)
+        pypcd4.PointCloud.from_xyz_points(cloud).save(pcd)
         for path in (ply, pcd):
             found = read_cloud(path, points=64)
             if sorted(found.tolist()) != sorted(cloud.tolist()):
@@ -28,7 +29,7 @@ def read_clouds() -> str:
 
 def write_hdf5() -> str:
     """Write an array as HDF5 and read it again."""
-    import h5py  # noqa: PLC0415
+    h5py: Any = import_module("h5py")
 
     numbers = np.arange(8)
     with h5py.File(io.BytesIO(), "w") as file:

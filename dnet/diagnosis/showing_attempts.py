@@ -3,7 +3,9 @@
 import io
 import subprocess
 import tempfile
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from dnet.diagnosis.vulkan import devices
 
@@ -84,9 +86,10 @@ def draw() -> str:
 def write_report() -> str:
     """Fill a template in, with a plot in it."""
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
-    from plotly.graph_objects import Figure, Scatter  # noqa: PLC0415
 
-    plot = Figure(Scatter(x=[0, 1], y=[0, 1])).to_html(full_html=False, include_plotlyjs=False)
+    plotly: Any = import_module("plotly.graph_objects")
+    curve = plotly.Figure(plotly.Scatter(x=[0, 1], y=[0, 1]))
+    plot = curve.to_html(full_html=False, include_plotlyjs=False)
     # Our own plot goes into our own page.
     environment = Environment(undefined=StrictUndefined)  # noqa: S701
     page = environment.from_string("<p>{{ plot }}</p>").render(plot=plot)
