@@ -94,7 +94,7 @@ def draw(rows: Sequence[Figures], path: Path) -> None:
         line = [scale * (mean + one.rise * (end - middle)) for end in ends]
         axes.plot(ends, line, color="#b9770e")
         axes.set_title(f"{TITLES[name]}: {one.verdict}", fontsize=9)
-        axes.set_ylim(0, 1.25 * max(values))
+        axes.set_ylim(0, 1.25 * max(*values, 1e-3))
         axes.grid(alpha=0.3)
         if axes.get_subplotspec().is_last_row():
             axes.set_xlabel("hours")

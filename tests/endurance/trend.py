@@ -77,8 +77,11 @@ def trend(rows: Sequence[Figures], name: str) -> Trend:
     rounds = settled(rows)
     hours = np.array([row.hours for row in rounds])
     values = np.array([float(getattr(row, name)) for row in rounds])
-    line = linregress(hours, values)
-    width = float(t.ppf((1 + CONFIDENCE) / 2, len(rounds) - 2))
+    rise, error = 0.0, 0.0
+    if np.ptp(values):  # SciPy knows no error of a line through equal values
+        line = linregress(hours, values)
+        rise = float(line.slope)
+        error = float(line.stderr) * float(t.ppf((1 + CONFIDENCE) / 2, len(rounds) - 2))
     median = float(np.median(values))
     return Trend(
         name=name,
@@ -87,7 +90,7 @@ def trend(rows: Sequence[Figures], name: str) -> Trend:
         last=float(values[-1]),
         lowest=float(values.min()),
         highest=float(values.max()),
-        rise=float(line.slope),
-        error=width * float(line.stderr),
+        rise=rise,
+        error=error,
         bound=SHARES[name] * median if name in SHARES else COUNTS[name],
     )
