@@ -87,7 +87,7 @@ class TableCache:
 
 
 def _sum(records: Records) -> int:
-    return zlib.crc32(np.ascontiguousarray(records).view(np.uint8))
+    return zlib.crc32(np.ascontiguousarray(records).view(np.uint8).data)
 
 
 def cache_folder(root: Place) -> Path:

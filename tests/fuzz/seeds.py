@@ -10,9 +10,11 @@ import struct
 import zipfile
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from mcap.writer import CompressionType
+from numpy.typing import NDArray
 from safetensors.numpy import save as save_tensors
 
 from dnet.datasets.index import FILES, FRAMES, open_index
@@ -101,7 +103,10 @@ def _checkpoints(corpus: Path) -> None:
         },
         "metrics": {"epoch": 1},
     }
-    tensors = {"a.weight": np.zeros((2, 3), np.float32), "b": np.zeros(0, np.int64)}
+    tensors: dict[str, NDArray[Any]] = {
+        "a.weight": np.zeros((2, 3), np.float32),
+        "b": np.zeros(0, np.int64),
+    }
     for network in ("DeformerNet", "HuNet", "DensePredictor", "KeypointNet", "PointRegressor"):
         text = json.dumps({**header, "network": network})
         _put(folder, network, save_tensors(tensors, metadata={"dnet": text}))
