@@ -24,7 +24,7 @@ from dnet.datasets.listing import Listed, list_logs
 from dnet.datasets.sources import said
 from dnet.datasets.stores import as_place, file_system, is_url, join
 from dnet.errors import NoEpisodes, TooLarge, Unfetched, WorkerDied
-from dnet.file_sizes import read_at_most
+from dnet.files.sizes import read_at_most
 from dnet.types import Place
 
 VERSION = "1"

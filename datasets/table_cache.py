@@ -14,7 +14,7 @@ from platformdirs import user_cache_path
 
 from dnet.datasets.stores import is_url
 from dnet.errors import Unwritten
-from dnet.plain_names import plain_name
+from dnet.files.plain_names import plain_name
 from dnet.types import Place
 
 FOLDER = ".cache"

@@ -8,13 +8,13 @@ from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 
 from dnet.errors import MissingPath, OccupiedOutput, TooFew, UnknownRecording, Unmerged
+from dnet.files.whole_file import whole_file
 from dnet.recorders.blueprint import Company
 from dnet.recorders.replay import OpenEpisode, application, replay, replay_beside
 from dnet.recorders.salvage import whole_recording
 from dnet.recorders.viewer import draw, show
 from dnet.recorders.viewer_process import RERUN
 from dnet.types import Place
-from dnet.whole_file import whole_file
 
 Progress = Callable[[int, int], None]
 """Is told how many files are made ready, and how many must be."""

@@ -10,6 +10,7 @@ from typing import TypeVar
 from rerun.experimental import ViewerClient, ViewerState
 
 from dnet.errors import NoPicture, ViewerFailed
+from dnet.files.whole_file import write_whole
 from dnet.recorders.rerun_scene import TIME_TIMELINE
 from dnet.recorders.viewer_process import (
     LOCAL,
@@ -20,7 +21,6 @@ from dnet.recorders.viewer_process import (
     free_port,
     running,
 )
-from dnet.whole_file import write_whole
 
 T = TypeVar("T")
 

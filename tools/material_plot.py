@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
 
+from dnet.files.whole_file import write_whole
 from dnet.tools.material import Validation
 from dnet.tools.material_agreement import Agreement
 from dnet.tools.material_bending import KNOWN_RATIOS, Bending
@@ -15,7 +16,6 @@ from dnet.tools.material_checks import POISSON_LIMIT, YOUNG_LIMIT
 from dnet.tools.material_meshes import LEAST_THICKNESS, MOST_NODES, Resolution, choose
 from dnet.tools.material_tension import STRAIN, Tension, uniaxial
 from dnet.types import Tissue
-from dnet.whole_file import write_whole
 
 # Okabe and Ito's colours, which colour-blind people tell apart.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"

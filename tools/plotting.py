@@ -14,11 +14,11 @@ from matplotlib.ticker import MaxNLocator
 from dnet.datasets.frame_table import settled_frames
 from dnet.datasets.index import Index
 from dnet.errors import TooFew
+from dnet.files.whole_file import write_whole
 from dnet.tools.histogram import histogram
 from dnet.tools.plotting_shapes import Shapes, spread
 from dnet.tools.plotting_sheet import draw_sheet, rows_of
 from dnet.tools.statistics_figure import check_picture
-from dnet.whole_file import write_whole
 
 SHEETS = 12
 MEASURED = 1000

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
 from dnet.errors import UnknownPicture
+from dnet.files.whole_file import write_whole
 from dnet.tools.histogram import histogram
 from dnet.tools.statistics import AXES, SCENE
 from dnet.tools.statistics_recorded import Recorded
 from dnet.tools.statistics_values import Draws, Statistics
-from dnet.whole_file import write_whole
 
 FORMATS = (".png", ".pdf", ".svg")
 LEAST_DENSITY = 2000

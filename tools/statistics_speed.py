@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most
+from dnet.files.sizes import LARGEST_JSON, parse_json, read_at_most
 
 TIMINGS = "timings.jsonl"
 

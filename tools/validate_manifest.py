@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 from dnet.tools.validate_episode import CheckedEpisode
 from dnet.tools.validate_findings import Finding, Findings
 

@@ -6,7 +6,7 @@ import numpy as np
 from rich.table import Table
 
 from dnet.datasets.reader import EpisodeReader
-from dnet.plain_names import plain_name
+from dnet.files.plain_names import plain_name
 from dnet.tools.listing import list_episodes
 from dnet.training.run import best_of, main_scores, read_config, read_history
 

@@ -187,8 +187,8 @@ class Servo:
         from rich.console import Console
 
         from dnet.commands.stopping import stopping
+        from dnet.files.one_writer import one_writer
         from dnet.laboratory import laboratory
-        from dnet.one_writer import one_writer
         from dnet.recorders.live_view import LiveView
         from dnet.trials.trial import run_trial
 

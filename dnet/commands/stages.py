@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 from rich.console import Console
 
 from dnet.errors import BadReport, OccupiedOutput, TooLarge
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 
 
 @runtime_checkable

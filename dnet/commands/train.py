@@ -127,7 +127,7 @@ class Train:
         """
         from rich.console import Console
 
-        from dnet.one_writer import one_writer
+        from dnet.files.one_writer import one_writer
         from dnet.training.allocation import keep_pages
         from dnet.training.parallel import meeting, this_process
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 from dnet.training.run import ERRORS, read_history
 
 ABLATIONS: Mapping[str, Mapping[str, Any]] = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import BadReport, TooLarge
-from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most
+from dnet.files.sizes import LARGEST_JSON, parse_json, read_at_most
 from dnet.geometry.chamfer import chamfer, legacy_chamfer
 from dnet.geometry.node_distance import node_distance
 

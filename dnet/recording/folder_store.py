@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from filelock import FileLock, Timeout
 
 from dnet.errors import NoSpace, OccupiedOutput, OutputInUse, StoreFailed, TooLarge
-from dnet.file_sizes import LARGEST_JSON, read_at_most
+from dnet.files.sizes import LARGEST_JSON, read_at_most
 
 LOCK = ".recording.lock"
 APART = ".recording-"

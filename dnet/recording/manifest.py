@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from dnet.errors import BadManifest, DamagedEpisode, OccupiedOutput, OtherRequest
-from dnet.file_sizes import parse_json
+from dnet.files.sizes import parse_json
 from dnet.recording.pair import PairReport, manifest_entry
 from dnet.recording.request import RecordingRequest, differences
 from dnet.recording.store import Store

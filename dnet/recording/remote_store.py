@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from dnet.datasets.sources import said
 from dnet.datasets.stores import S3, file_system
 from dnet.errors import NoSpace, StoreFailed, TooLarge, UnknownStore
-from dnet.file_sizes import LARGEST_JSON
+from dnet.files.sizes import LARGEST_JSON
 
 BUCKETS = (*S3, "gs", "gcs", "abfs", "abfss", "az")
 """Stores in which a folder is but the beginning of a name; to make one could make a bucket."""

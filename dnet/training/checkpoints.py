@@ -13,7 +13,8 @@ from safetensors.torch import save as save_tensors
 from torch import Tensor
 
 from dnet.errors import BadCheckpoint, TooLarge
-from dnet.file_sizes import parse_json
+from dnet.files.sizes import parse_json
+from dnet.files.whole_file import write_whole
 from dnet.nets.deformernet import Coordinates, DeformerNet, DeformerNetConfig
 from dnet.nets.hu import HuNet, HuNetConfig
 from dnet.nets.keypoints import KeypointNet
@@ -21,7 +22,6 @@ from dnet.nets.manipulation_point import DensePredictor, PointRegressor
 from dnet.nets.neighbourhoods import Size
 from dnet.nets.pointconv import Norm
 from dnet.training.objectives import Network
-from dnet.whole_file import write_whole
 
 N = TypeVar("N", bound=Network)
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from dnet.errors import TooFew
+from dnet.files.whole_file import write_whole
 from dnet.training.run import RunWriter
 from dnet.training.scores import Errors, Scores
 from dnet.training.tasks import Task
-from dnet.whole_file import write_whole
 
 CARD = "MODEL_CARD.md"
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadCheckpoint, Disagreement, MissingExtra
+from dnet.files.whole_file import write_whole
 from dnet.nets.deformernet import DeformerNet
 from dnet.nets.onnx_agreement import LIMIT, Agreement, agreement
 from dnet.nets.onnx_network import FEATURES, GOAL, MOTION, TABLES, OnnxDeformerNet, open_session
 from dnet.training.checkpoints import config_of, header_of
-from dnet.whole_file import write_whole
 
 SUFFIX = ".onnx"
 

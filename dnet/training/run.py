@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dnet.errors import BadCheckpoint, OccupiedOutput, OtherRun, OtherStream, TooLarge
-from dnet.file_sizes import LARGEST_JSON, parse_json, read_at_most, read_json
+from dnet.files.sizes import LARGEST_JSON, parse_json, read_at_most, read_json
+from dnet.files.whole_file import write_whole
 from dnet.training.checkpoints import BEST, read_tensors, save, write_json, write_tensors
 from dnet.training.objectives import Network
 from dnet.training.progress import EpochDone
 from dnet.training.scores import Errors
 from dnet.training.training import Training
-from dnet.whole_file import write_whole
 
 LAST, CONFIG, METRICS, STATE, ERRORS = (
     "last.safetensors",

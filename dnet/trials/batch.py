@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import DnetError, MissingPath, NoGoals, WorkerDied
+from dnet.files.one_writer import one_writer
 from dnet.laboratory import Laboratory, LaboratorySettings, laboratory
-from dnet.one_writer import one_writer
 from dnet.perception.cloud_file import READERS
 from dnet.trials.request import Trial
 from dnet.trials.trial import clear, is_finished, refuse, run_trial

@@ -7,8 +7,8 @@ import pytest
 
 from dnet.cli import main
 from dnet.errors import OccupiedOutput, OutputInUse, Unwritten
+from dnet.files.one_writer import one_writer
 from dnet.laboratory import LaboratorySettings
-from dnet.one_writer import one_writer
 from dnet.trials.batch import run_trials
 from dnet.trials.request import Trial
 from tests.recorders import rollout

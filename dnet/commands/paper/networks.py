@@ -14,7 +14,7 @@ from dnet.evaluation.report.asked import read_asked, write_asked
 from dnet.evaluation.report.networks_section import ARCHITECTURE
 from dnet.evaluation.report.published import GRASP_CASES
 from dnet.evaluation.report.trainings import CONFIG, ERRORS, SHIPPED, SHIPPED_HU
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
 from dnet.training.checkpoints import load, load_any, weights_file, write_json
 from dnet.training.division import divide, thinned

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadName, BadReport, TooLarge
-from dnet.file_sizes import read_json
-from dnet.plain_names import plain_path
+from dnet.files.plain_names import plain_path
+from dnet.files.sizes import read_json
 
 ASKED = "asked.json"
 

@@ -8,7 +8,7 @@ from dnet.evaluation.report.asked import Asked
 from dnet.evaluation.report.published import TEST_MSE_MM2, TRAIN_MSE_MM2
 from dnet.evaluation.report.trainings import Errors, Training, read_trainings
 from dnet.evaluation.report.values import Bar, BarPlot, Cell, Claim, Column, Section, Sheet
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 
 ARCHITECTURE = "architecture.json"
 PARTS = ("training", "unseen shapes", "unseen episodes")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dnet.errors import BadReport
-from dnet.file_sizes import read_json
+from dnet.files.sizes import read_json
 
 CONFIG, ERRORS = "config.json", "errors.json"
 """Names of a training's own files: copies of them are kept with the experiment."""

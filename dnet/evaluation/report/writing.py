@@ -14,7 +14,7 @@ from dnet.evaluation.report.text import (
     sheets_of,
 )
 from dnet.evaluation.report.values import Report
-from dnet.whole_file import write_whole
+from dnet.files.whole_file import write_whole
 
 PAGE, MARKDOWN, CLAIMS = "report.html", "report.md", "report.csv"
 

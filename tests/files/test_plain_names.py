@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dnet.errors import BadName
-from dnet.plain_names import LONGEST_NAME, plain_name, plain_path
+from dnet.files.plain_names import LONGEST_NAME, plain_name, plain_path
 
 NO_NAMES = [
     "../../x",

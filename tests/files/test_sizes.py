@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from dnet.errors import TooLarge
-from dnet.file_sizes import parse_json, read_at_most, read_json
+from dnet.files.sizes import parse_json, read_at_most, read_json
 
 
 def test_a_file_is_read_up_to_its_limit_and_not_beyond(tmp_path: Path) -> None:
