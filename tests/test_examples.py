@@ -60,7 +60,7 @@ def ran(script: str, *arguments: object) -> str:
     way = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         ["bash", str(EXAMPLES / f"{script}.sh"), *map(str, arguments)],
-        env=os.environ | {"PATH": way},
+        env=os.environ | {"PATH": way, "COLUMNS": "120"},
         capture_output=True,
         text=True,
         check=True,

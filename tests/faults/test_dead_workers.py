@@ -60,8 +60,15 @@ def test_a_dead_loader_worker_ends_the_stream_by_name(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_dead_describer_of_clouds_keeps_what_it_found(tmp_path: Path) -> None:
     tables = NeighbourTables(table_of(tmp_path, *range(12)), SMALL)
+    told = []
+
+    def kill_at_the_first(clouds: int) -> None:
+        told.append(clouds)
+        if len(told) == 1:
+            kill_a_worker()
+
     with pytest.raises(WorkerDied, match="described the clouds"):
-        tables.build(workers=2, on_clouds=lambda _: kill_a_worker())
+        tables.build(workers=2, on_clouds=kill_at_the_first)
     assert list(tmp_path.rglob("*.npy"))
     tables.build()
     assert len(list(tmp_path.rglob("*.npy"))) == 12

@@ -35,7 +35,6 @@ def write_nothing(folder: str, writable: str) -> None:
         ["servo", "--goals", data, "--controller", "none", "--out", out, *QUICK],
         ["inspect", "export", data, "--to", "npz", "--out", out],
         ["inspect", "plot", data, "--out", f"{out}.png"],
-        ["inspect", "repair", data, "--out", out],
     ):
         with pytest.raises(SystemExit) as ended:
             main(asked)

@@ -34,6 +34,13 @@ def test_what_falls_short_of_the_goal_comes_to_lie_on_it_point_by_point(seed: in
     assert np.linalg.norm(found - true, axis=1).mean() < np.linalg.norm(short - true, axis=1).mean()
 
 
+def test_what_is_shifted_as_a_whole_is_shifted_all_the_way() -> None:
+    cloud = flat()
+    goal = cloud + np.array([0, 0, 0.001], np.float32)
+    # Each point is pulled twice, by its own nearest and as the nearest of one: their mean counts.
+    np.testing.assert_allclose(fit(cloud, cloud, goal), goal, atol=1e-7)
+
+
 def test_the_order_of_the_goal_does_not_matter() -> None:
     cloud = flat()
     goal = bent(cloud, 0.03)
