@@ -47,6 +47,7 @@ def test_a_controller_of_ones_own_drives_a_run(data: Path, tmp_path: Path) -> No
     assert (tmp_path / "run" / "run.mcap").is_file()
 
 
+@pytest.mark.slow
 def test_a_network_of_ones_own_is_trained_and_drives_a_run(data: Path, tmp_path: Path) -> None:
     goal = f"{data / 'episode-0-00001.mcap'}:1"
     lines = printed("own_network", data, goal, tmp_path / "run").splitlines()
@@ -67,6 +68,7 @@ def ran(script: str, *arguments: object) -> str:
     ).stdout
 
 
+@pytest.mark.slow
 def test_logs_of_ones_own_are_learned_from(data: Path, tmp_path: Path) -> None:
     assert "2 episodes, no faults" in ran("own_logs", data, tmp_path)
     assert (tmp_path / "network" / "best.safetensors").is_file()

@@ -125,6 +125,7 @@ def export_and_be_refused(folder: str, source: str) -> None:
         assert not list(place.iterdir())
 
 
+@pytest.mark.slow
 def test_an_export_and_a_picture_leave_nothing(tmp_path: Path) -> None:
     data, disk = tmp_path / "data", tmp_path / "disk"
     for number in range(2):
@@ -153,5 +154,6 @@ def index_without_room(folder: str) -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_dataset_is_indexed_without_room_for_the_index(tmp_path: Path) -> None:
     elsewhere(index_without_room, tmp_path, mount=small_disk(tmp_path, "1M"))
