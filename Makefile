@@ -30,7 +30,7 @@ else echo "Run: sudo $$command"; fi
 endef
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop libraries demo reproduce test slow coverage check format lint type layers docs benchmark build clean
+.PHONY: help setup develop libraries demo reproduce test slow coverage check format lint type mypy pyright layers docs benchmark build clean
 
 help: ## Say what there is
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -71,7 +71,7 @@ reproduce: setup $(VENV)/.report ## The paper from nothing, on SCALE of its work
 	$(BIN)/dnet reproduce --scale $(SCALE) --out $(OUT)
 
 test: develop ## Run the checks and the tests
-	$(MAKE) --no-print-directory check
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile
 
 slow: develop ## Run the tests that take minutes each, which `make test` leaves out
@@ -93,8 +93,12 @@ lint:
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 
-type:
+type: mypy pyright
+
+mypy:
 	$(BIN)/mypy
+
+pyright:
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 layers:
