@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dnet.cli import main
+from dnet.commands.evaluate import Evaluate
 from dnet.commands.evaluate_paper import Paper
 from dnet.commands.record import Record
 from dnet.commands.reproduce import ToTheEnd, command_of
@@ -67,7 +68,9 @@ def test_nothing_learns_from_the_unseen_data(tmp_path: Path) -> None:
 
 
 def test_the_report_is_made_with_the_networks_that_were_trained(tmp_path: Path) -> None:
-    report = commands(tmp_path, 0.02)["report"]
+    evaluation = commands(tmp_path, 0.02)["report"]
+    assert isinstance(evaluation, Evaluate)
+    report = evaluation.experiment
     assert isinstance(report, Paper)
     runs = tmp_path / "runs"
     found = [report.checkpoint, report.keypoints, report.regressor, report.dense]

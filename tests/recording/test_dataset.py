@@ -131,7 +131,7 @@ class Small(FolderStore):
 def test_a_disk_that_fills_up_is_said_to_be_full_and_what_was_finished_stays(
     undisturbed: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(NoSpace, match=r"has 0\.00 GB free"):
+    with pytest.raises(NoSpace, match=r"has 0\.00 MB free"):
         record(Small(tmp_path), REQUEST)
     assert open_manifest(FolderStore(tmp_path), REQUEST).missing() == [2]
     record(FolderStore(tmp_path), REQUEST)
