@@ -30,8 +30,9 @@ from dnet.geometry.chamfer import chamfer
 from dnet.trials.request import Trial
 from dnet.weights import REGRESSOR
 
-# Every experiment but the one that records for each condition: it has a test of its own.
-ONLY = [f"--only={name}" for name in ("grasp", "cases", "importance", "networks", "goals")]
+# What records for each condition has a test of its own; what a bad point costs is left out for the
+# sake of time, and carried out where the paper is reproduced at a small scale.
+ONLY = [f"--only={name}" for name in ("grasp", "cases", "networks", "goals")]
 SMALL = ("--scale", "0.01", "--world", "quasistatic", *ONLY)
 NAMES = ("report.html", "report.md", "report.csv")
 
@@ -109,7 +110,8 @@ def test_the_cases_are_told_as_their_logs_have_them(made: Path) -> None:
         assert row["Chamfer, end, mm"] == pytest.approx(distances[-1])
         assert row["point off, mm"] == pytest.approx(1e3 * np.linalg.norm(off))
     claims = {claim.where: claim for claim in report.claims}
-    assert all(claims[f"figure {number}"].met is not None for number in range(1, 7))
+    assert all(claims[f"figure {number}"].met is not None for number in (1, 3, 4, 5, 6))
+    assert claims["figure 2"].met is None
     assert claims["figure 3"].reason.startswith("on 1 of 4, at scale 0.01")
 
 
