@@ -11,6 +11,7 @@ from dnet.commands.evaluate import Evaluate
 from dnet.commands.record import Record
 from dnet.commands.stages import Command
 from dnet.commands.train import Train
+from dnet.files.whole_file import write_whole
 
 ENTRIES: dict[str, type[Command]] = {"record": Record, "train": Train, "evaluate": Evaluate}
 
@@ -109,6 +110,4 @@ def _write_times(file: Path, seconds: dict[str, float]) -> None:
     """Write how long the stages took that are done."""
     rows = [*seconds.items(), ("together", sum(seconds.values()))]
     table = "".join(f"| {name} | {taken:.1f} |\n" for name, taken in rows)
-    part = file.with_suffix(".part")
-    part.write_text(f"| stage | seconds |\n|---|--:|\n{table}", encoding="utf-8")
-    part.replace(file)
+    write_whole(file, f"| stage | seconds |\n|---|--:|\n{table}".encode())

@@ -9,6 +9,7 @@ from typing import Any
 from dnet.errors import BadName, BadReport, TooLarge
 from dnet.files.plain_names import plain_path
 from dnet.files.sizes import read_json
+from dnet.files.whole_file import write_whole
 
 ASKED = "asked.json"
 
@@ -42,10 +43,7 @@ class Asked:
 
 def write_asked(folder: Path, asked: Asked) -> None:
     """Write down what is asked of the experiment in a directory."""
-    folder.mkdir(parents=True, exist_ok=True)
-    part = folder / f".{ASKED}.part"
-    part.write_text(json.dumps(asdict(asked), indent=2) + "\n", encoding="utf-8")
-    part.replace(folder / ASKED)
+    write_whole(folder / ASKED, (json.dumps(asdict(asked), indent=2) + "\n").encode())
 
 
 def read_asked(folder: Path) -> Asked | None:
