@@ -6,7 +6,13 @@ from hypothesis import strategies as st
 from dnet.errors import NoDisplacement, OutOfReach
 from dnet.geometry.sampling import farthest_points
 from dnet.nets.keypoints import Keypoints
-from dnet.servo.displacement_heuristic import DisplacementHeuristic, top_weights, with_hidden
+from dnet.servo.displacement_heuristic import (
+    FAINT,
+    DisplacementHeuristic,
+    most_of,
+    pulls,
+    with_hidden,
+)
 from dnet.sim.scenes import Workspace
 from dnet.types import Cloud
 
@@ -36,7 +42,7 @@ def unmoved(initial: Cloud, goal: Cloud) -> Keypoints:
     return Keypoints(initial[:200], initial[:200], 0.0)
 
 
-@pytest.mark.parametrize(("most", "power"), [(3, 1), (10, 1), (20, 1), (20, 6), (200, 6)])
+@pytest.mark.parametrize(("most", "power"), [(3, 1), (10, 1), (20, 1), (20, 4), (200, 4)])
 def test_the_point_that_was_pulled_is_found(most: int, power: int) -> None:
     found = DisplacementHeuristic(true_keypoints, most, power).choose(slab(), bumped(slab()))
     assert np.linalg.norm(found.point - CENTRE) < 0.005
@@ -48,7 +54,7 @@ def test_a_choice_tells_what_it_was_made_by() -> None:
     moved = np.linalg.norm(found.keypoints.goal - found.keypoints.initial, axis=1)
     np.testing.assert_allclose(found.displacement, moved)
     assert np.count_nonzero(found.weights) == 10
-    assert found.weights[moved.argmax()] == found.weights.max()
+    assert moved[found.weights.argmax()] > 0.95 * moved.max()
     assert found.weights.sum() == pytest.approx(1.0, abs=1e-6)
 
 
@@ -83,22 +89,59 @@ def test_confidence_is_the_share_of_the_difference_that_is_explained() -> None:
     assert DisplacementHeuristic(nothing_explained).choose(initial, goal).confidence == 0.0
 
 
+def lever(points: Cloud) -> Cloud:
+    """A strip that is held at least x and pulled up at its middle: beyond, all moves alike."""
+    lift = 0.04 * np.clip((points[:, :1] + 0.05) / 0.06, 0.0, 1.0)
+    return (points + lift * [0.0, 0.0, 1.0]).astype(np.float32)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_lies_beyond_the_grasp_and_moves_as_far_is_not_taken(seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(0.0, 2e-4, (200, 3))
+
+    def found_nearly(initial: Cloud, goal: Cloud) -> Keypoints:
+        points = farthest_points(initial, 200)
+        return Keypoints(points, (lever(points) + noise).astype(np.float32), 0.0)
+
+    strip = slab()[np.abs(slab()[:, 1]) < 0.02]
+    found = DisplacementHeuristic(found_nearly).choose(strip, lever(strip))
+    assert found.point[0] == pytest.approx(0.01, abs=0.012)
+    farthest = DisplacementHeuristic(found_nearly, power=0).choose(strip, lever(strip))
+    assert farthest.point[0] > 0.02
+
+
+def test_a_point_is_pulled_by_what_it_has_beyond_the_mean_around_it() -> None:
+    points = farthest_points(slab(), 200)
+    bump = pulls(Keypoints(points, bumped(points), 0.0))
+    away = np.linalg.norm(points - CENTRE.astype(np.float32), axis=1)
+    assert away[bump.argmax()] < 0.01
+    assert bump.max() > 0.005
+    # Along its own displacement: what moves less than its surroundings is not pulled.
+    lift = bumped(points) - points
+    dent = pulls(Keypoints(points, points + np.float32([0.0, 0.0, 0.06]) - lift, 0.0))
+    assert dent[away < 0.01].max() < 1e-4
+
+
+def test_where_all_moves_alike_nothing_is_pulled_but_faintly() -> None:
+    points = farthest_points(slab(), 200)
+    shift = np.array([0.01, 0.0, 0.02], np.float32)
+    alike = pulls(Keypoints(points, points + shift, 0.0))
+    np.testing.assert_allclose(alike, FAINT * np.linalg.norm(shift), rtol=1e-3)
+
+
 @given(
-    lengths=st.lists(st.floats(2**-10, 1.0, width=32), min_size=3, max_size=30),
+    values=st.lists(st.floats(2**-10, 1.0, width=32), min_size=3, max_size=30),
     most=st.integers(1, 40),
-    power=st.sampled_from([1, 2, 6]),
 )
-def test_weights_are_powers_of_the_greatest_displacements_in_proportion(
-    lengths: list[float], most: int, power: int
-) -> None:
-    displacement = np.array(lengths, np.float32)
-    weights = top_weights(displacement, most, power=power)
+def test_the_greatest_weights_are_kept_in_proportion(values: list[float], most: int) -> None:
+    before = np.array(values, np.float32)
+    weights = most_of(before, most)
     assert weights.sum() == pytest.approx(1.0, abs=1e-5)
     counted = np.flatnonzero(weights)
-    assert len(counted) == min(most, len(lengths))
-    others = np.setdiff1d(np.arange(len(lengths)), counted)
-    assert displacement[others].max(initial=0) <= displacement[counted].min()
-    ratio = weights[counted] / (displacement[counted] / displacement.max()) ** power
+    assert len(counted) == min(most, len(values))
+    others = np.setdiff1d(np.arange(len(values)), counted)
+    assert before[others].max(initial=0) <= before[counted].min()
+    ratio = weights[counted] / before[counted]
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-4)
 
 
