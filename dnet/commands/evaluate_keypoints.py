@@ -31,8 +31,8 @@ class EvaluateKeypoints:
     given."""
     cases: int = 100
     """Pairs of a rest shape and a goal."""
-    most: int = 100
-    """Keypoints, those most displaced, that a manipulation point is the mean of."""
+    most: int = 20
+    """Keypoints, those pulled out most, that a manipulation point is the mean of."""
     validation: float = 0.1
     """Share of the episodes that are held out, as in the training of the network; 1 for all."""
     seed: int = 0
