@@ -10,8 +10,9 @@ import numpy as np
 
 from dnet.errors import EmptyGrasp, NoValidShape, Unreachable
 from dnet.sim.bullet_world import BulletWorld
+from dnet.sim.foresight import LEAST_VOLUME_RATIO
 from dnet.sim.grasp import grasp
-from dnet.sim.rollout import LEAST_VOLUME_RATIO, PATIENCE
+from dnet.sim.rollout import PATIENCE
 from dnet.sim.scenes import Workspace, draw_displacement, draw_scene
 from dnet.sim.soft_body import NodeIndices
 from dnet.sim.tetrahedra import Vertices

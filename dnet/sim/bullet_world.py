@@ -211,6 +211,12 @@ class BulletWorld:
         """Return the least volume ratio that a displacement from rest leads to."""
         return self._foresight.least_volume_ratio(displacement)
 
+    def borne(self, motion: Point) -> float:
+        """Return how much of a straight motion of the tip the object bears, as a share."""
+        if not len(self._start.gripped):
+            return 1.0
+        return self._foresight.borne(self._body.nodes(), motion)
+
     def deviation(self) -> float:
         """Return how far the worst node is from where the grasp takes it straight from rest."""
         return self._foresight.deviation(self._body.nodes())

@@ -160,6 +160,12 @@ class QuasistaticWorld:
         """Return the least volume ratio that a displacement from rest leads to."""
         return self._foresight.least_volume_ratio(displacement)
 
+    def borne(self, motion: Point) -> float:
+        """Return how much of a straight motion of the tip the object bears, as a share."""
+        if not len(self._grasp.gripped):
+            return 1.0
+        return self._foresight.borne(self._found.nodes, motion)
+
     def deviation(self) -> float:
         """Return how far the worst node is from where the grasp takes it straight from rest."""
         return self._foresight.deviation(self._found.nodes)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from dnet.errors import EmptyGrasp, NoValidShape, Unreachable
+from dnet.sim.foresight import LEAST_VOLUME_RATIO
 from dnet.sim.scenes import Workspace, draw_displacement, draw_scene
 from dnet.sim.world import World
 from dnet.types import Frame, FrameKind, JointPath, Joints, Plan, Point, Scene, Tissue
@@ -15,8 +16,6 @@ from dnet.types import Frame, FrameKind, JointPath, Joints, Plan, Point, Scene, 
 Times = Float64[np.ndarray, "_"]
 DrawTissue = Callable[[np.random.Generator], Tissue]
 
-LEAST_VOLUME_RATIO = 0.05
-"""A shape with a tetrahedron squeezed below this share of its volume is not one of tissue."""
 LARGEST_DEVIATION = 0.005
 """A shape with a node farther than this from where the same grasp takes it straight from rest is
 one of several that the grasp allows, in metres."""

@@ -109,3 +109,10 @@ class GraspingWorld(World, Protocol):
     def slip(self) -> float:
         """Return how far what the moving arm grasped is from between its jaws, in metres."""
         ...
+
+    def borne(self, motion: Point) -> float:
+        """Return how much of a straight motion of the tip the object bears, as a share.
+
+        1 for all of it, or if the jaws are open; else up to where it would be crushed.
+        """
+        ...

@@ -19,6 +19,7 @@ from dnet.servo.grasping import Hand
 from dnet.servo.held_end import LIMIT, held_end_apart
 from dnet.servo.loop import Surroundings, servo
 from dnet.servo.pickers import Choice, Picker, candidates
+from dnet.servo.sparing import SparingPlanner
 from dnet.sim.grasp import at
 from dnet.trials.eyes import Eyes
 from dnet.trials.goals import Task, read_task
@@ -78,7 +79,7 @@ def run_trial(
                     lab.world,
                     eyes.look,
                     controller,
-                    lab.planner,
+                    SparingPlanner(lab.planner, lab.world.borne),
                     log,
                     regrasp=grasping.again,
                     stop=stop,

@@ -14,6 +14,7 @@ from dnet.sim.world import GraspingWorld
 from dnet.types import Scene
 
 SCENE = Scene((0.006, -0.004), 0.15, (-0.04, 0.0, 0.04), (0.04, 0.0, 0.04))
+CRUSHING = np.array([-0.08, 0.0, -0.04])
 ELSEWHERE = np.array([0.03, 0.03, 0.04])
 
 
@@ -75,3 +76,17 @@ def test_where_there_is_no_tissue_nothing_is_grasped(world: GraspingWorld) -> No
         world.regrasp(np.array([0.09, 0.0, 0.06]))
     np.testing.assert_array_equal(world.tip, tip)
     assert world.slip() < 1e-4
+
+
+def test_both_worlds_bear_the_same(world: GraspingWorld) -> None:
+    """To within the hundredths of a millimetre to which Bullet settles."""
+    world.reset(SCENE)
+    pull(world, [0.02, 0.01, 0.02])
+    assert world.borne(np.array([0.0, 0.0, 0.01])) == 1.0
+    assert world.borne(CRUSHING) == pytest.approx(0.688, abs=0.01)
+
+
+def test_with_open_jaws_any_motion_is_borne(world: GraspingWorld) -> None:
+    world.reset(SCENE)
+    world.release()
+    assert world.borne(CRUSHING) == 1.0
