@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from dnet.errors import BadCloudFile, MissingExtra, MissingPath
+from dnet.errors import BadCloudFile, HugeCloud, MissingExtra, MissingPath
 from dnet.geometry.sampling import farthest_points
 from dnet.perception.cloud_claims import check_claims
-from dnet.perception.huge_clouds import refuse_huge
 from dnet.types import Cloud
 
 EXTRA = "clouds"
@@ -38,11 +37,10 @@ def read_cloud(path: Path, *, points: int) -> Cloud:
     if not path.is_file():
         raise MissingPath(path, "cloud", "give a .npy, .ply or .pcd file")
     read = READERS[path.suffix.lower()]
-    refuse_huge(path)
     try:
         check_claims(path)
         found = np.asarray(read(path))
-    except (MissingExtra, OSError):
+    except (MissingExtra, HugeCloud, OSError):
         raise
     # A reader of somebody else's raises what it likes on a file that is none.
     except Exception as error:
