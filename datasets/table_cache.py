@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from dnet.datasets.stores import is_url
-from dnet.errors import Unwritten
 from dnet.files.plain_names import plain_name
+from dnet.files.whole_file import whole_file
 from dnet.types import Place
 
 FOLDER = ".cache"
@@ -64,21 +64,10 @@ class TableCache:
         Raises:
             Unwritten: If they cannot be written.
         """
-        path = self._path(digest)
-        # Two processes may do this at a time: each writes a file of its own.
-        part = path.with_name(f"{path.name}.{os.getpid()}.part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                with part.open("wb") as file:
-                    np.save(file, records, allow_pickle=False)
-                    # Behind the records, where numpy does not look.
-                    file.write(_SUM.pack(_sum(records)))
-                part.replace(path)
-            finally:
-                part.unlink(missing_ok=True)
-        except OSError as error:
-            raise Unwritten(path.parent, str(error)) from error
+        with whole_file(self._path(digest)) as part, part.open("wb") as file:
+            np.save(file, records, allow_pickle=False)
+            # Behind the records, where numpy does not look.
+            file.write(_SUM.pack(_sum(records)))
 
     def _path(self, digest: str) -> Path:
         version = sha256(self.version.encode()).hexdigest()[:16]

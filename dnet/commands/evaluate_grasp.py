@@ -118,13 +118,11 @@ class Grasp:
     ) -> None:
         from dnet.evaluation.grasp import frame_of
         from dnet.evaluation.grasp_figure import draw_cases
+        from dnet.files.whole_file import write_whole
         from dnet.recorders.grasp_recording import write_grasps
 
-        out.mkdir(parents=True, exist_ok=True)
         for name, text in (("grasp.md", table), ("grasp.csv", frame_of(cases, answers))):
-            part = out / f".{name}.part"
-            part.write_text(text, encoding="utf-8")
-            part.replace(out / name)
+            write_whole(out / name, text.encode())
         draw_cases(cases, answers, out / "grasp.png")
         views = [self._view(number, case, answers) for number, case in enumerate(cases)]
         write_grasps(out / "grasp.rrd", views)

@@ -103,6 +103,7 @@ class ServoGoals:
         import json
 
         from dnet.evaluation.servo_table import servo_frame, servo_table, summary
+        from dnet.files.whole_file import write_whole
 
         table = servo_table(found)
         figures = {name: summary(scores) for name, scores in found}
@@ -111,7 +112,5 @@ class ServoGoals:
             ("servo.csv", servo_frame(found).write_csv()),
             ("servo.json", json.dumps(figures, indent=2)),
         ):
-            part = self.out / f".{name}.part"
-            part.write_text(content, encoding="utf-8")
-            part.replace(self.out / name)
+            write_whole(self.out / name, content.encode())
         return table
