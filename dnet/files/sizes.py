@@ -1,6 +1,8 @@
 """Files read whole, if they are no larger than what is believed of their kind."""
 
 import json
+import os
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,8 @@ from dnet.errors import TooLarge
 LARGEST_JSON = 64 * 2**20
 """Bytes of a JSON document, or of lines of them, that are still parsed: parsed ones take ten times
 their bytes and more. A manifest has 300 bytes an episode, a training's history 2 KB an epoch."""
+
+_PIECE = 2**20
 
 
 def read_at_most(path: Path, most: int, *, what: str) -> bytes:
@@ -24,11 +28,15 @@ def read_at_most(path: Path, most: int, *, what: str) -> bytes:
         OSError: If it cannot be read.
     """
     with path.open("rb") as file:
-        # What a file says of its length is no limit to what it gives: devices and pipes say 0.
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise TooLarge(what, path, path.stat().st_size, most)
-    return content
+        size = os.fstat(file.fileno()).st_size
+        # Piece by piece, for room is made for all that is asked for, and `most` may be large. What
+        # a file says of its length is no limit to what it gives: devices and pipes say 0.
+        content = BytesIO()
+        while max(size, content.tell()) <= most and (piece := file.read(_PIECE)):
+            content.write(piece)
+    if max(size, content.tell()) > most:
+        raise TooLarge(what, path, max(size, content.tell()), most)
+    return content.getvalue()
 
 
 def parse_json(content: bytes | str) -> Any:

@@ -14,6 +14,12 @@ def test_a_file_is_read_up_to_its_limit_and_not_beyond(tmp_path: Path) -> None:
         read_at_most(path, 4, what="note")
 
 
+def test_a_limit_beyond_all_memory_costs_none(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"12345")
+    assert read_at_most(path, 2**60, what="note") == b"12345"
+
+
 def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
     with pytest.raises(TooLarge):
         read_at_most(Path("/dev/zero"), 1000, what="note")
