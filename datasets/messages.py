@@ -162,19 +162,24 @@ def read_step(message: memoryview) -> dict[str, Any]:
 
 def read_meta(record: Mapping[str, str]) -> EpisodeMeta:
     """Return what the metadata `dnet.episode` says."""
-    scene = _document(record["scene"])
     return EpisodeMeta(
         episode_id=record["episode_id"],
-        seed=int(record["seed"]),
-        index=int(record["index"]),
-        scene=Scene(
-            position=_numbers(scene["position"], 2),
-            yaw=_finite(scene["yaw"]),
-            hold=_numbers(scene["hold"], 3),
-            manipulation_point=_numbers(scene["manipulation_point"], 3),
-            tissue=_read_tissue(scene["tissue"]),
-        ),
+        seed=_int64(record["seed"]),
+        index=_int64(record["index"]),
+        scene=read_scene(record["scene"]),
         settings=dict(_document(record["settings"])),
+    )
+
+
+def read_scene(text: str) -> Scene:
+    """Return the scene that a JSON document describes."""
+    scene = _document(text)
+    return Scene(
+        position=_numbers(scene["position"], 2),
+        yaw=_finite(scene["yaw"]),
+        hold=_numbers(scene["hold"], 3),
+        manipulation_point=_numbers(scene["manipulation_point"], 3),
+        tissue=_read_tissue(scene["tissue"]),
     )
 
 
@@ -227,6 +232,13 @@ def _finite(value: Any) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise NotFinite(f"{number} where a number must be")
+    return number
+
+
+def _int64(text: str) -> int:
+    number = int(text)
+    if not -(2**63) <= number < 2**63:
+        raise OverflowError(f"{text[:40]} where a number of 64 bits must be")
     return number
 
 
