@@ -91,6 +91,16 @@ class BadEpisode(DnetError, ValueError):
         super().__init__(f"{path} {why}; {hint}")
 
 
+class BadIndex(DnetError, ValueError):
+    """An index that says of a log what no log says."""
+
+    def __init__(self, index: Path | str, name: str, what: str, value: object) -> None:
+        super().__init__(
+            f"{index} says of {name} that its {what} is {str(value)[:60]!r}, which no recording "
+            "writes; delete the index: it is made anew from the logs"
+        )
+
+
 class NoSuchFrame(DnetError, IndexError):
     """A frame number beyond the end of an episode."""
 

@@ -1,20 +1,25 @@
 """What the figures of a recording are computed from: a row an episode, a row a frame."""
 
-import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
 import numpy as np
 import polars as pl
 
 from dnet.datasets.directory import find_unfinished
-from dnet.datasets.index import open_index
-from dnet.errors import NoEpisodes
+from dnet.datasets.index import INDEX, Index, open_index
+from dnet.datasets.messages import UNREADABLE, read_scene
+from dnet.errors import BadIndex, NoEpisodes
+from dnet.files.sizes import parse_json
 from dnet.geometry.pose import rotation_z
 from dnet.tools.statistics_oddities import Oddities, oddities
+from dnet.types import Scene
+
+MOST_REJECTED = 2**40
+"""Draws of one episode; what says of more, says nothing."""
 
 _EPISODES = {
     "episode": pl.String,
@@ -69,6 +74,7 @@ def read_recorded(
     Raises:
         MissingPath: If there is no such directory.
         NoEpisodes: If it holds no finished episode.
+        BadIndex: If its index, which is not its own, says of one what cannot be.
     """
     index = open_index(directory, on_file=on_episode)
     readable = index.files.filter(pl.col("note") == "")
@@ -82,10 +88,17 @@ def read_recorded(
             f"(`dnet inspect ls {directory}` says why)",
         )
     rows = list(finished.iter_rows(named=True))
-    rejected = [one for row in rows for one in _rejected(row)]
+    results = [_result(index, row) for row in rows]
+    rejected = [
+        one for row, result in zip(rows, results, strict=True) for one in _rejected(row, result)
+    ]
     return Recorded(
         directory,
-        pl.DataFrame([_row(row) for row in rows], schema=_EPISODES, orient="row"),
+        pl.DataFrame(
+            [_row(index, row, result) for row, result in zip(rows, results, strict=True)],
+            schema=_EPISODES,
+            orient="row",
+        ),
         _frames(index.frames.join(finished.select("name"), on="name", maintain_order="left")),
         pl.DataFrame(rejected, schema=_REJECTED, orient="row"),
         oddities(index),
@@ -94,10 +107,10 @@ def read_recorded(
     )
 
 
-def _row(file: Mapping[str, Any]) -> tuple[Any, ...]:
-    scene = json.loads(file["scene"])
-    offset = np.array(scene["manipulation_point"]) - np.array([*scene["position"], 0.0])
-    deviation = _mapping(file, "deviation_mm")
+def _row(index: Index, file: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[Any, ...]:
+    scene = _scene(index, file)
+    offset = np.array(scene.manipulation_point) - np.array([*scene.position, 0.0])
+    deviation = _mapping(result, "deviation_mm")
     return (
         file["name"],
         file["bytes"],
@@ -105,8 +118,8 @@ def _row(file: Mapping[str, Any]) -> tuple[Any, ...]:
         file["object"],
         *(1e3 * file[f"size_{axis}"] for axis in "xyz"),
         file["young"],
-        *(1e3 * rotation_z(scene["yaw"]).T @ offset).tolist(),
-        _mapping(file, "rejected") is not None,
+        *(1e3 * rotation_z(scene.yaw).T @ offset).tolist(),
+        _mapping(result, "rejected") is not None,
         None if deviation is None else _number(deviation.get("mean")),
         None if deviation is None else _number(deviation.get("worst")),
     )
@@ -121,18 +134,36 @@ def _frames(frames: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _rejected(file: Mapping[str, Any]) -> list[tuple[str, str, int]]:
-    reasons = _mapping(file, "rejected") or {}
+def _scene(index: Index, file: Mapping[str, Any]) -> Scene:
+    try:
+        return read_scene(file["scene"])
+    except UNREADABLE as error:
+        raise BadIndex(index.path(INDEX), file["name"], "scene", file["scene"]) from error
+
+
+def _result(index: Index, file: Mapping[str, Any]) -> Mapping[str, Any]:
+    try:
+        return dict(parse_json(file["result"]))
+    except (ValueError, TypeError) as error:
+        raise BadIndex(index.path(INDEX), file["name"], "result", file["result"]) from error
+
+
+def _rejected(file: Mapping[str, Any], result: Mapping[str, Any]) -> list[tuple[str, str, int]]:
+    reasons = _mapping(result, "rejected") or {}
     return [
-        (file["name"], reason, count) for reason, count in reasons.items() if isinstance(count, int)
+        (file["name"], reason, count)
+        for reason, count in reasons.items()
+        if isinstance(count, int) and abs(count) < MOST_REJECTED
     ]
 
 
-def _mapping(file: Mapping[str, Any], key: str) -> Mapping[str, Any] | None:
+def _mapping(result: Mapping[str, Any], key: str) -> Mapping[str, Any] | None:
     """Return a part of the result, None if an older recording lacks it."""
-    value = json.loads(file["result"]).get(key)
+    value = result.get(key)
     return value if isinstance(value, Mapping) else None
 
 
 def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    # A whole number in JSON may be larger than any float.
+    known = isinstance(value, int | float) and abs(value) <= float_info.max
+    return float(value) if known else None

@@ -1,13 +1,17 @@
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from jaxtyping import Float64
 
-from dnet.errors import MissingPath, NoEpisodes
+from dnet.datasets.index import INDEX, open_index
+from dnet.datasets.index_file import pack_index
+from dnet.errors import BadIndex, MissingPath, NoEpisodes
 from dnet.geometry.pose import rotation_z
 from dnet.recorders.episode import EpisodeWriter
 from dnet.tools.statistics import statistics
@@ -275,3 +279,31 @@ def test_nowhere_and_nothing_finished_are_refused(tmp_path: Path) -> None:
     (tmp_path / "b.mcap.part").write_bytes(b"")
     with pytest.raises(NoEpisodes, match="1 unfinished and 1 broken"):
         read_recorded(tmp_path)
+
+
+@pytest.mark.parametrize("column", ["scene", "result"])
+@pytest.mark.parametrize("value", ["{", "[]", "7", '{"position": [1, 2]}', "[" * 100_000, None])
+def test_what_a_foreign_index_says_of_an_episode_is_refused_by_name_and_value(
+    tmp_path: Path, column: str, value: str | None
+) -> None:
+    path = record(tmp_path / "a.mcap", CORNERS[:3])
+    index = open_index(tmp_path)
+    spoiled = index.files.with_columns(pl.lit(value, pl.String).alias(column))
+    (tmp_path / INDEX).write_bytes(pack_index(spoiled, index.frames))
+    if (column, value) in {("scene", None), ("result", "[]"), ("result", '{"position": [1, 2]}')}:
+        assert figures(tmp_path).files.finished == 1
+        return
+    told = re.escape(f"its {column} is {str(value)[:60]!r}")
+    with pytest.raises(BadIndex, match=rf"{INDEX} says of {path.name} that {told}.*delete the"):
+        figures(tmp_path)
+    (tmp_path / INDEX).unlink()
+    assert figures(tmp_path).files.finished == 1
+
+
+@pytest.mark.parametrize("value", [10**30, -(10**30), 10**400, "many", None, [1]])
+def test_a_count_or_a_deviation_that_cannot_be_is_left_out(tmp_path: Path, value: object) -> None:
+    result = {"rejected": {"folded": value, "slipped": 2}, "deviation_mm": {"mean": value}}
+    record(tmp_path / "a.mcap", CORNERS[:3], result=result)
+    draws = figures(tmp_path).draws
+    assert draws is not None
+    assert [(one.reason, one.count) for one in draws.rejected] == [("slipped", 2)]
