@@ -1,7 +1,7 @@
 """The index of a dataset: a row a file and a row a frame, kept beside the logs and up to date.
 
-`index.parquet` holds the frames and `index-files.parquet` the files. Both can be thrown away: they
-are made from the logs, and made anew where they are missing, stale, or of another version.
+It can be thrown away: it is made from the logs, and made anew where it is missing, stale, damaged,
+untrue or of another version.
 """
 
 import os
@@ -11,31 +11,27 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
 
 import polars as pl
-from polars.exceptions import PanicException, PolarsError
 
-from dnet.datasets.index_rows import FILE_COLUMNS, FRAME_COLUMNS, FileRows, read_rows
-from dnet.datasets.index_trust import SPARE, believable, worth_reading
+from dnet.datasets.index_file import pack_index, unpack_index
+from dnet.datasets.index_rows import FILE_COLUMNS, FileRows, read_rows
+from dnet.datasets.index_trust import MOST_REMOVED, believable, most_bytes
 from dnet.datasets.listing import Listed, list_logs
 from dnet.datasets.sources import said
 from dnet.datasets.stores import as_place, file_system, is_url, join
-from dnet.errors import NoEpisodes, TooLarge, Unfetched, WorkerDied
+from dnet.errors import NoEpisodes, TooLarge, Unfetched, Unwritten, WorkerDied
 from dnet.files.sizes import read_at_most
+from dnet.files.whole_file import write_whole
 from dnet.types import Place
 
-VERSION = "1"
-"""Of what the tables hold: an index of another version is made anew."""
-FRAMES, FILES = "index.parquet", "index-files.parquet"
+INDEX = "index.dnet"
 FILES_A_PROCESS = 64
 """New files that are worth the start of one more process."""
 REQUESTS = 16
 """Files of a store that are fetched at a time."""
-
-_STAMP = {"dnet.index": VERSION}
 
 
 @dataclass(frozen=True)
@@ -102,8 +98,8 @@ def _unchanged(stored: Index | None, listed: Sequence[Listed]) -> set[str]:
     """Return the names of the files that are what they were when they were indexed."""
     if stored is None:
         return set()
-    known = set(stored.files.select("name", "version").iter_rows())
-    return {one.name for one in listed if (one.name, one.version) in known}
+    known = set(stored.files.select("name", "version", "bytes").iter_rows())
+    return {one.name for one in listed if (one.name, one.version, one.size) in known}
 
 
 def _read(
@@ -168,69 +164,40 @@ def _believable(stored: Index, kept: set[str]) -> bool:
 
 def _load(root: Place, listed: Sequence[Listed]) -> Index | None:
     """Return the index as it was stored, None if there is none that can be used."""
-    sizes = {one.name: one.size for one in listed}
     try:
-        most = sum(sizes.values()) + SPARE
-        told, seen = (_content(root, name, most=most) for name in (FILES, FRAMES))
-        for content in (told, seen):
-            if pl.read_parquet_metadata(BytesIO(content)).get("dnet.index") != VERSION:
-                return None
-        if not worth_reading(told, seen, sizes=sizes):
-            return None
-        files, frames = (pl.read_parquet(BytesIO(content)) for content in (told, seen))
-    # The reader of somebody else's files may also give up in the middle.
-    except (OSError, PolarsError, PanicException, Unfetched, TooLarge):
+        content = _content(root, most=most_bytes(one.size for one in listed))
+        return Index(root, *unpack_index(content, most=len(listed) + MOST_REMOVED))
+    except (OSError, ValueError, Unfetched, TooLarge):
         return None
-    if dict(files.schema) != _schema(FILE_COLUMNS) or dict(frames.schema) != _schema(FRAME_COLUMNS):
-        return None
-    # Two tables that were written by two processes at a time need not go together.
-    counted = frames.group_by("name").len("frames").sort("name")
-    stated = files.filter(pl.col("frames") > 0).select("name", pl.col("frames").cast(pl.UInt32))
-    return Index(root, files, frames) if counted.equals(stated.sort("name")) else None
 
 
-def _schema(columns: dict[str, object]) -> dict[str, object]:
-    return dict(pl.Schema(columns))  # type: ignore[arg-type]
-
-
-def _content(root: Place, name: str, *, most: int) -> bytes:
+def _content(root: Place, *, most: int) -> bytes:
     if not is_url(root):
-        return read_at_most(Path(root) / name, most, what="index")
+        return read_at_most(Path(root) / INDEX, most, what="index")
     files, path = file_system(str(root), doing="reading")
     try:
-        if (size := files.info(f"{path}/{name}")["size"]) > most:
-            raise TooLarge("index", join(root, name), size, most)
-        content: bytes = files.cat_file(f"{path}/{name}")
+        if (size := files.info(f"{path}/{INDEX}")["size"]) > most:
+            raise TooLarge("index", join(root, INDEX), size, most)
+        content: bytes = files.cat_file(f"{path}/{INDEX}")
     except TooLarge:
         raise
     # Stores raise what they like.
     except Exception as error:
-        raise Unfetched(str(join(root, name)), said(error)) from error
+        raise Unfetched(str(join(root, INDEX)), said(error)) from error
     return content
 
 
 def _store(index: Index) -> None:
-    """Write both tables where that is possible."""
-    # An index that cannot be kept costs time, and nothing else.
-    with suppress(OSError):
-        for name, table in ((FRAMES, index.frames), (FILES, index.files)):
-            content = BytesIO()
-            table.write_parquet(content, metadata=_STAMP)
-            _put(index.root, name, content.getvalue())
+    """Write the index where that is possible."""
+    content = pack_index(index.files, index.frames)
+    # An index that cannot be kept costs time, and nothing else: stores raise what they like.
+    with suppress(Exception if is_url(index.root) else Unwritten):
+        _put(index.root, content)
 
 
-def _put(root: Place, name: str, content: bytes) -> None:
+def _put(root: Place, content: bytes) -> None:
     if is_url(root):
         files, path = file_system(str(root), doing="writing to")
-        try:
-            files.pipe_file(f"{path}/{name}", content)
-        except Exception as error:
-            raise OSError(said(error)) from error
-        return
-    # Two processes may do this at a time: each writes a file of its own.
-    part = Path(root) / f".{name}.{os.getpid()}.part"
-    try:
-        part.write_bytes(content)
-        part.replace(Path(root) / name)
-    finally:
-        part.unlink(missing_ok=True)
+        files.pipe_file(f"{path}/{INDEX}", content)
+    else:
+        write_whole(Path(root) / INDEX, content)

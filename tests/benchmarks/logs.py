@@ -25,7 +25,8 @@ from rich.table import Table
 from dnet.datasets.batch_order import BatchOrder
 from dnet.datasets.clouds import Clouds
 from dnet.datasets.frame_table import FrameTable, settled_frames
-from dnet.datasets.index import Index, open_index
+from dnet.datasets.index import INDEX, Index, open_index
+from dnet.datasets.index_file import pack_index, unpack_index
 from dnet.datasets.pairs import any_two
 from dnet.datasets.samples import Samples
 from dnet.datasets.stream import Stream
@@ -68,7 +69,7 @@ class Benchmark:
             table = settled_frames(index)
             self._compare(index, scratch, console)
             _stream(table, console)
-            _query(index, scratch, console)
+            _query(index, console)
             _written(Clouds(table), scratch, console)
 
     def _made_up(self, folder: Path, console: Console) -> Path:
@@ -139,8 +140,7 @@ def _noisy(one: Frame, rng: np.random.Generator) -> Frame:
 
 
 def _opened(root: Path, console: Console) -> Index:
-    for name in ("index.parquet", "index-files.parquet"):
-        (root / name).unlink(missing_ok=True)
+    (root / INDEX).unlink(missing_ok=True)
     begin = process_time()
     index = open_index(root, workers=1)
     cold = process_time() - begin
@@ -190,24 +190,26 @@ def _bytes(table: FrameTable) -> int:
     return sum(array.nbytes for array in arrays)
 
 
-def _query(index: Index, scratch: Path, console: Console) -> None:
+def _query(index: Index, console: Console) -> None:
     times = -(-MANY // index.frames.height)
-    path = scratch / "large.parquet"
-    moved = np.random.default_rng(2).normal(scale=0.03, size=(3, MANY))
+    renamed = [pl.format("{}-{}", pl.lit(copy), "name") for copy in range(times)]
+    files, frames = (
+        pl.concat([table.with_columns(name=name) for name in renamed])
+        for table in (index.files, index.frames)
+    )
+    moved = np.random.default_rng(2).normal(scale=0.03, size=(3, frames.height))
     columns = {f"motion_{axis}": values for axis, values in zip("xyz", moved, strict=True)}
-    frames = pl.concat([index.frames] * times)[:MANY]
-    frames.with_columns(**columns).write_parquet(path)
+    content = pack_index(files, frames.with_columns(**columns))
     begin = perf_counter()
+    _, frames = unpack_index(content, most=files.height)
     found = (
-        pl.scan_parquet(path)
-        .filter((pl.col("kind") == "shape") & (pl.col("motion_z") > 0.02))
-        .group_by("episode")
+        frames.filter((pl.col("kind") == "shape") & (pl.col("motion_z") > 0.02))
+        .group_by("name")
         .agg(pl.len(), pl.col("motion_x").mean())
-        .collect()
     )
     console.print(
-        f"an index of {MANY} frames, {path.stat().st_size / 1e6:.0f} MB, asked for the shapes that "
-        f"were lifted by 2 cm, by episode ({found.height}): {perf_counter() - begin:.3f} s"
+        f"an index of {frames.height} frames, {len(content) / 1e6:.0f} MB, asked for the shapes "
+        f"that were lifted by 2 cm, by episode ({found.height}): {perf_counter() - begin:.3f} s"
     )
 
 

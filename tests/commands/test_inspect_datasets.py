@@ -5,7 +5,7 @@ import pytest
 import tyro
 
 from dnet.commands.inspect import Inspect
-from dnet.datasets.index import FILES, FRAMES
+from dnet.datasets.index import INDEX
 from dnet.errors import MissingPath, NothingMatches, UnlikePaths
 from tests.datasets.dataset import write_dataset
 
@@ -28,8 +28,7 @@ def test_split_then_merge_is_the_same_dataset(
     assert [line.partition(":")[0] for line in out] == [str(side) for side in sides]
     run("merge", *sides, "--out", tmp_path / "merged")
     assert capsys.readouterr().out == f"3 episodes in {tmp_path / 'merged'}\n"
-    assert (tmp_path / "merged" / FILES).exists()
-    assert (tmp_path / "merged" / FRAMES).exists()
+    assert (tmp_path / "merged" / INDEX).exists()
     run("diff", data, tmp_path / "merged")
     assert capsys.readouterr().out == "3 files, the same in both\n"
 

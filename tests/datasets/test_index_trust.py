@@ -5,9 +5,11 @@ import polars as pl
 import pytest
 
 from dnet.datasets.frame_table import settled_frames
-from dnet.datasets.index import FILES, FRAMES, open_index
-from dnet.datasets.index_trust import LEAST_FRAME, MOST_REMOVED, worth_reading
+from dnet.datasets.index import INDEX, open_index
+from dnet.datasets.index_file import pack_index, unpack_index
+from dnet.datasets.index_trust import MOST_REMOVED, SHARE, most_bytes
 from tests.datasets.dataset import write_dataset
+from tests.recorders import rollout
 
 Spoil = Callable[[pl.DataFrame], pl.DataFrame]
 
@@ -26,9 +28,13 @@ def files_read(folder: Path) -> int:
     return len(read)
 
 
-def spoil(folder: Path, name: str, change: Spoil) -> None:
-    table = change(pl.read_parquet(folder / name))
-    table.write_parquet(folder / name, metadata={"dnet.index": "1"})
+def same(table: pl.DataFrame) -> pl.DataFrame:
+    return table
+
+
+def spoil(folder: Path, *, files: Spoil = same, frames: Spoil = same) -> None:
+    stored = unpack_index((folder / INDEX).read_bytes(), most=9)
+    (folder / INDEX).write_bytes(pack_index(files(stored[0]), frames(stored[1])))
 
 
 def put(column: str, value: object) -> Spoil:
@@ -52,11 +58,18 @@ def test_an_index_of_its_own_is_believed_broken_files_and_all(folder: Path) -> N
         put("sha256", None),
         put("sha256", "0" * 63 + "\n"),
         put("episode", None),
+        put("object", None),
+        put("scene", None),
+        put("finished", None),
+        put("shapes", None),
+        put("young", float("nan")),
+        put("size_x", None),
+        put("seconds", float("inf")),
     ],
 )
-def test_a_file_without_a_digest_or_an_id_is_not_believed(folder: Path, change: Spoil) -> None:
+def test_a_file_without_what_all_files_have_is_not_believed(folder: Path, change: Spoil) -> None:
     """A digest becomes the name of a table in the folder of caches."""
-    spoil(folder, FILES, change)
+    spoil(folder, files=change)
     assert files_read(folder) == 3
     assert files_read(folder) == 0
 
@@ -64,7 +77,7 @@ def test_a_file_without_a_digest_or_an_id_is_not_believed(folder: Path, change: 
 @pytest.mark.parametrize(
     "change",
     [
-        put("data", -1),
+        put("data", -2),
         put("data", 2**62),
         put("points", 2**31 - 1),
         put("points", -1),
@@ -72,44 +85,50 @@ def test_a_file_without_a_digest_or_an_id_is_not_believed(folder: Path, change: 
         put("length", 2**62),
         put("length", 0),
         put("message", -1),
-        put("message", None),
-        put("frame", 7),
-        put("frame", -1),
         put("time", float("nan")),
         put("grasp_x", float("inf")),
-        put("kind", None),
-        put("episode", "another"),
     ],
 )
 def test_a_frame_that_lies_outside_its_file_is_not_believed(folder: Path, change: Spoil) -> None:
-    spoil(folder, FRAMES, change)
+    spoil(folder, frames=change)
     assert files_read(folder) == 3
     assert files_read(folder) == 0
 
 
-@pytest.mark.parametrize(("name", "rows"), [(FRAMES, 50_000), (FILES, 50_000)])
-def test_a_table_of_more_rows_than_the_logs_can_have_is_not_read(
-    folder: Path, name: str, rows: int
-) -> None:
-    """Rows that are all alike take next to no room in a file."""
-    path = folder / name
-    table = pl.read_parquet(path)
-    pl.concat([table[:1]] * rows).rechunk().write_parquet(path, metadata={"dnet.index": "1"})
-    assert path.stat().st_size < rows
-    contents = [(folder / one).read_bytes() for one in (FILES, FRAMES)]
-    sizes = {one.name: one.stat().st_size for one in folder.glob("*.mcap")}
-    assert not worth_reading(*contents, sizes=sizes)
+def test_a_file_of_other_bytes_than_it_has_is_read_again(folder: Path) -> None:
+    """What its frames say is held against them."""
+    spoil(folder, files=put("bytes", 2**62), frames=put("data", 2**61))
+    assert files_read(folder) == 1
+    assert files_read(folder) == 0
+
+
+def test_a_file_that_comes_twice_is_not_believed(folder: Path) -> None:
+    spoil(folder, files=lambda table: pl.concat([table, table[:1]]).sort("name"), frames=twice)
     assert files_read(folder) == 3
 
 
-def test_what_a_real_index_holds_is_far_from_the_limits(folder: Path) -> None:
-    logs = list(folder.glob("episode*.mcap"))
-    frames = pl.read_parquet(folder / FRAMES).height
-    assert frames < sum(one.stat().st_size for one in logs) / LEAST_FRAME / 10
-    assert len(logs) < MOST_REMOVED
+def twice(frames: pl.DataFrame) -> pl.DataFrame:
+    first = frames.filter(pl.col("name") == frames["name"][0])
+    return pl.concat([first, frames])
+
+
+def test_an_index_of_many_more_files_than_there_are_is_made_anew(folder: Path) -> None:
+    def more(files: pl.DataFrame) -> pl.DataFrame:
+        removed = files.filter(pl.col("note") != "").with_columns(name=pl.lit("removed.mcap"))
+        return pl.concat([files, *[removed] * (MOST_REMOVED + 1)])
+
+    spoil(folder, files=more)
+    assert files_read(folder) == 3
+
+
+def test_what_a_real_index_holds_is_far_from_the_limits(tmp_path: Path) -> None:
+    log = rollout.write(tmp_path / "one.mcap", rollout.frames(3, points=2048))
+    open_index(tmp_path)
+    size = log.stat().st_size
+    assert (tmp_path / INDEX).stat().st_size < size / SHARE / 10 < most_bytes([size])
 
 
 def test_an_index_larger_than_its_logs_is_not_read(folder: Path) -> None:
-    with (folder / FRAMES).open("ab") as file:
+    with (folder / INDEX).open("ab") as file:
         file.truncate(2**40)
     assert files_read(folder) == 3

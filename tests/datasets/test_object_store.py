@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from dnet.datasets.clouds import Clouds
+from dnet.datasets.index import INDEX
 from dnet.datasets.reader import EpisodeReader
 from dnet.datasets.sources import BLOCK, BlockCache
 from tests.datasets.dataset import LENGTHS, table_of, write_dataset
@@ -24,6 +25,6 @@ def test_a_dataset_in_an_object_store_is_indexed_and_read_by_ranges(
             np.testing.assert_array_equal(far[row], near[row])
         assert cache.bytes <= 2 * BLOCK
         names = {entry.rsplit("/", 1)[-1] for entry in files.ls(f"{bucket}/data", refresh=True)}
-        assert {"index.parquet", "index-files.parquet"} <= names
+        assert INDEX in names
         with EpisodeReader(f"{bucket}/data/episode-2.mcap") as episode:
             assert episode.meta.episode_id == "episode-2"

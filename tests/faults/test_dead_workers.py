@@ -7,7 +7,7 @@ import psutil
 import pytest
 
 from dnet.datasets.groups import GroupBatch
-from dnet.datasets.index import FRAMES, open_index
+from dnet.datasets.index import INDEX, open_index
 from dnet.datasets.loading import Share, load_groups
 from dnet.datasets.stream import Stream, dead_workers
 from dnet.errors import WorkerDied
@@ -44,7 +44,7 @@ def test_a_dead_reader_of_logs_leaves_no_index_and_the_next_call_makes_it(tmp_pa
 
     with pytest.raises(WorkerDied, match=r"read the logs in .* was killed.*run the same command"):
         open_index(tmp_path, workers=2, on_file=kill_at_the_first)
-    assert not (tmp_path / FRAMES).exists()
+    assert not (tmp_path / INDEX).exists()
     assert open_index(tmp_path, workers=1).files.height == 60
 
 

@@ -17,7 +17,8 @@ from mcap.writer import CompressionType
 from numpy.typing import NDArray
 from safetensors.numpy import save as save_tensors
 
-from dnet.datasets.index import FILES, FRAMES, open_index
+from dnet.datasets.index import INDEX, open_index
+from dnet.datasets.index_file import HEAD
 from dnet.geometry.camera import Camera
 from dnet.sim.urdf import psm_urdf
 from dnet.weights import HU
@@ -75,17 +76,8 @@ def _index(corpus: Path) -> None:
     with TemporaryDirectory() as place:
         root = Path(place) / "indexed"
         targets.indexed(root)
-        found = open_index(root)
-        plain = []
-        for table in (found.files, found.frames):
-            content = io.BytesIO()
-            table.write_parquet(
-                content, metadata={"dnet.index": "1"}, compression="uncompressed", statistics=False
-            )
-            plain.append(content.getvalue())
-        _put(corpus / "index", "plain", targets.together(*plain))
-        stored = [(root / name).read_bytes() for name in (FILES, FRAMES)]
-        _put(corpus / "index", "stored", targets.together(*stored))
+        open_index(root)
+        _put(corpus / "index", "body", (root / INDEX).read_bytes()[HEAD:])
 
 
 def _checkpoints(corpus: Path) -> None:
