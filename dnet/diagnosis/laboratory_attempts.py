@@ -13,12 +13,12 @@ POINTS = 64
 
 def step() -> str:
     """Let PyBullet move a soft box by some steps under gravity."""
-    from dnet.sim.bullet import pybullet  # noqa: PLC0415
+    from dnet.sim.bullet import pybullet, start_server  # noqa: PLC0415
     from dnet.sim.soft_body import SoftBody  # noqa: PLC0415
     from dnet.sim.tetrahedra import box_mesh  # noqa: PLC0415
 
     mesh = box_mesh((0.1, 0.1, 0.04), (2, 2, 1))
-    client: int = pybullet.connect(pybullet.DIRECT)
+    client = start_server()
     try:
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
         pybullet.setGravity(0, 0, -9.81, physicsClientId=client)

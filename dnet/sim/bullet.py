@@ -1,4 +1,4 @@
-"""PyBullet, without what it prints from C: its build time, and the size of every soft body."""
+"""PyBullet, without what it prints from C and what it would keep of every file that it reads."""
 
 import os
 from collections.abc import Iterator
@@ -26,4 +26,16 @@ def quiet() -> Iterator[None]:
 with needed_for("the simulation"), quiet():
     import pybullet
 
-__all__ = ["pybullet", "quiet"]
+__all__ = ["pybullet", "quiet", "start_server"]
+
+
+def start_server() -> int:
+    """Start a Bullet server in this process, and return its number.
+
+    Bullet keeps every mesh that it reads from an .obj, by the name of the file, until the process
+    ends. Ours are each in a file of its own, read once: kept, they would be a leak, so that is
+    turned off, for the whole process.
+    """
+    client: int = pybullet.connect(pybullet.DIRECT)
+    pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
+    return client

@@ -7,7 +7,7 @@ from jaxtyping import Float64
 
 from dnet.geometry.camera import Camera, DepthImage
 from dnet.sim.arms import HOME, Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
@@ -72,7 +72,7 @@ class BulletWorld:
     def __init__(self, settings: BulletSettings | None = None) -> None:
         """Start a Bullet server of its own in this process."""
         self.settings = settings or BulletSettings()
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._client = start_server()
         self._time = 0.0
         self._joints = (HOME, HOME)
         self.object_id = -1

@@ -6,7 +6,7 @@ from jaxtyping import Bool
 from dnet.geometry.camera import Camera
 from dnet.sim.arm_boxes import Boxes, arm_boxes, block_boxes
 from dnet.sim.arms import Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_solid
 from dnet.sim.furniture import furniture
@@ -26,7 +26,7 @@ class Clearance:
 
     def __init__(self, placement: Placement, camera: Camera, *, margin: float = MARGIN) -> None:
         """Set up the arms, the table, and the camera on its stand."""
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._client = start_server()
         self._margin = margin
         self._placement = placement
         self._arms = BulletArms(self._client, placement)

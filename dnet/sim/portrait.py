@@ -4,7 +4,7 @@ import numpy as np
 
 from dnet.geometry.camera import Camera, DepthImage
 from dnet.sim.arms import Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
@@ -27,7 +27,7 @@ class Portrait:
             arms: Whether they are in the picture.
         """
         self._camera = camera
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._client = start_server()
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=self._client)
         self._picture = SoftPicture(self._client, tissue_mesh(tissue))
         self.object_id = self._picture.body

@@ -8,7 +8,7 @@ from jaxtyping import Float64
 from dnet.geometry.camera import Camera, DepthImage
 from dnet.geometry.pose import inverse
 from dnet.sim.arms import HOME, Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_picture
 from dnet.sim.bullet_eyes import depth_image
@@ -53,7 +53,7 @@ class QuasistaticWorld:
         self._placement = placement or Placement()
         self._camera = camera or Camera()
         self._jaw_radius = jaw_radius
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._client = start_server()
         self._time = 0.0
         self._joints = (HOME, HOME)
         self.object_id = -1

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from dnet.errors import Unsettled
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.material import wave_speed
 from dnet.sim.soft_body import NodeIndices, SoftBody
 from dnet.sim.tetrahedra import TetrahedralMesh, Vertices
@@ -61,7 +61,7 @@ def hang(
     Raises:
         Unsettled: If it does not come to rest.
     """
-    client: int = pybullet.connect(pybullet.DIRECT)
+    client = start_server()
     try:
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
         x, y, z = gravity.tolist()

@@ -5,7 +5,7 @@ import numpy as np
 from dnet.geometry.camera import Camera
 from dnet.sim.arm_boxes import Boxes, arm_boxes, block_boxes
 from dnet.sim.arms import Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_blocks import add_solid
 from dnet.sim.clearance import SLACK
@@ -17,7 +17,7 @@ PLACE = Placement()
 
 def test_no_link_stands_out_of_its_box_by_more_than_bullets_skin() -> None:
     """Measured by Bullet down to a floor, to which the lowest point of each link is nearest."""
-    client = pybullet.connect(pybullet.DIRECT)
+    client = start_server()
     arms = BulletArms(client, PLACE)
     floor = add_solid(Block("floor", "box", (9.0, 9.0, 1.0), (0.0, 0.0, -1.5)), client)
     random = np.random.default_rng(0)

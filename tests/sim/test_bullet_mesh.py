@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.soft_body import SoftBody
 from dnet.sim.soft_picture import SoftPicture
 from dnet.sim.tetrahedra import box_mesh
@@ -16,7 +16,7 @@ MESH = box_mesh((0.1, 0.06, 0.04), (5, 3, 2))
 
 @pytest.fixture
 def client() -> Iterator[int]:
-    number: int = pybullet.connect(pybullet.DIRECT)
+    number = start_server()
     yield number
     pybullet.disconnect(physicsClientId=number)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dnet.sim.arms import Placement
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_arms import BulletArms
 from dnet.sim.bullet_motors import ArmMotors
 from dnet.sim.psm import VELOCITY
@@ -20,7 +20,7 @@ class Bench:
     """Both arms alone in a world without gravity, with motors on both."""
 
     def __init__(self) -> None:
-        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self.client = start_server()
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=self.client)
         pybullet.setTimeStep(STEP, physicsClientId=self.client)
         self.arms = BulletArms(self.client, Placement())

@@ -84,7 +84,7 @@ def test_a_joint_beyond_its_limit_is_named() -> None:
 def test_bullet_agrees_with_the_chain(tmp_path: Path) -> None:
     path = tmp_path / "psm.urdf"
     path.write_text(psm_urdf())
-    client = pybullet.connect(pybullet.DIRECT)
+    client = start_server()
     body = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=client)
     count = pybullet.getNumJoints(body, physicsClientId=client)
     numbers = {
@@ -115,7 +115,7 @@ def test_bullet_loads_the_urdf_without_a_word(
     path = tmp_path / "psm.urdf"
     path.write_text(psm_urdf())
     with quiet():
-        client = pybullet.connect(pybullet.DIRECT)
+        client = start_server()
     pybullet.loadURDF(str(path), physicsClientId=client)
     captured = capfd.readouterr()
     with quiet():

@@ -10,7 +10,7 @@ import pytest
 
 from dnet.errors import TooFew
 from dnet.geometry.pose import rotation_z
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.elastic_energy import elements, energy_and_gradient
 from dnet.sim.material import stable_neo_hookean
 from dnet.sim.quasistatic import Equilibrium, QuasistaticSolver
@@ -86,7 +86,7 @@ def come_to_rest_in_bullet(client: int, mesh: TetrahedralMesh, pulled: Pull) -> 
 
 class Server:
     def __init__(self) -> None:
-        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self.client = start_server()
 
     def close(self) -> None:
         pybullet.disconnect(physicsClientId=self.client)

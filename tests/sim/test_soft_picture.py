@@ -7,7 +7,7 @@ import open3d
 import pytest
 
 from dnet.geometry.camera import Camera, unproject
-from dnet.sim.bullet import pybullet
+from dnet.sim.bullet import pybullet, start_server
 from dnet.sim.bullet_eyes import depth_image
 from dnet.sim.soft_picture import SoftPicture
 from dnet.sim.tetrahedra import Vertices, box_mesh
@@ -18,7 +18,7 @@ CAMERA = Camera(width=96, height=72)
 
 @pytest.fixture
 def client() -> Iterator[int]:
-    number: int = pybullet.connect(pybullet.DIRECT)
+    number = start_server()
     pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=number)
     yield number
     pybullet.disconnect(physicsClientId=number)
