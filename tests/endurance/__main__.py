@@ -62,6 +62,8 @@ class Endurance:
         begin = monotonic()
         number = 0
         while (monotonic() - begin) / 3600 < self.hours:
+            # A name of its own: servo knows networks by the names of their files.
+            folder = held / f"round-{number}"
             log = self.out / "log.txt"
             mode = "a" if log.exists() and log.stat().st_size < 1e6 * MARGIN else "w"
             with (
@@ -69,8 +71,8 @@ class Endurance:
                 redirect_stdout(said),
                 redirect_stderr(said),
             ):
-                work(held / "round", number=number)
-            shutil.rmtree(held / "round")
+                work(folder, number=number)
+            shutil.rmtree(folder)
             hours = (monotonic() - begin) / 3600
             table.add(measure(held, number=number, hours=hours))
             number += 1

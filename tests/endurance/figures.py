@@ -1,5 +1,6 @@
 """What a process and its children hold at one instant: memory, files, threads, disk."""
 
+import ctypes
 import gc
 import os
 from collections.abc import Iterable
@@ -19,8 +20,11 @@ class Figures:
     """Since the first round began."""
     rss: int
     """Bytes of memory that the process and its children have in RAM, shared pages included."""
-    uss: int
-    """Bytes that would be free again if they ended: shared pages left out."""
+    anonymous: int
+    """Those that are of no file: all that was allocated, and what the allocator keeps of it. Pages
+    of files are left out, for whether they count as its own depends on who else has them mapped."""
+    heap: int
+    """Bytes that C code of this process has asked for and not given back."""
     objects: int
     """Python's containers in this process: what a reference that was not dropped keeps."""
     handles: int
@@ -44,13 +48,13 @@ def measure(folder: Path, *, number: int, hours: float) -> Figures:
     gc.collect()  # what only waits for the collector is no leak
     here = psutil.Process()
     tree = [here, *here.children(recursive=True)]
-    memory = [process.memory_full_info() for process in tree]
     there = list(_under(folder))
     return Figures(
         round=number,
         hours=hours,
-        rss=sum(one.rss for one in memory),
-        uss=sum(one.uss for one in memory),
+        rss=sum(process.memory_info().rss for process in tree),
+        anonymous=sum(part.anonymous for process in tree for part in process.memory_maps()),
+        heap=_heap(),
         objects=len(gc.get_objects()),
         handles=sum(process.num_fds() for process in tree),
         threads=sum(process.num_threads() for process in tree),
@@ -58,6 +62,25 @@ def measure(folder: Path, *, number: int, hours: float) -> Figures:
         disk=sum(path.lstat().st_size for path in there if path.is_file()),
         files=len(there),
     )
+
+
+class _Heap(ctypes.Structure):
+    """What glibc tells of its allocator: see mallinfo(3)."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd",
+            "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
+        )
+    )  # fmt: skip
+
+
+def _heap() -> int:
+    ask = ctypes.CDLL(None).mallinfo2
+    ask.restype = _Heap
+    told = ask()
+    return int(told.uordblks + told.hblkhd)
 
 
 def _under(folder: Path) -> Iterable[Path]:

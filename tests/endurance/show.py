@@ -19,10 +19,11 @@ from tests.endurance.trend import NAMES, Trend, settled, trend
 TABLE = "figures.csv"
 LEAST = 12
 """Rounds that a line needs."""
-MEGABYTES = ("rss", "uss", "disk")
+MEGABYTES = ("rss", "anonymous", "heap", "disk")
 TITLES = {
     "rss": "memory with shared pages (RSS), MB",
-    "uss": "memory of its own (USS), MB",
+    "anonymous": "memory that is of no file, MB",
+    "heap": "asked for by C code, MB",
     "objects": "Python's objects",
     "disk": "disk, MB",
     "files": "files and folders",
@@ -80,10 +81,10 @@ def _line(one: Trend) -> str:
 
 def draw(rows: Sequence[Figures], path: Path) -> None:
     """Draw each figure over time, and its line."""
-    figure = Figure(figsize=(11, 9), layout="constrained")
+    figure = Figure(figsize=(13, 8), layout="constrained")
     after = settled(rows)
     hours = [row.hours for row in rows]
-    for axes, name in zip(figure.subplots(4, 2, sharex=True).flat, NAMES, strict=True):
+    for axes, name in zip(figure.subplots(3, 3, sharex=True).flat, NAMES, strict=True):
         scale = 1e-6 if name in MEGABYTES else 1.0
         one = trend(rows, name)
         values = [scale * getattr(row, name) for row in rows]

@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as hnp
 from dnet.errors import Unreachable
 from dnet.geometry.pose import pose, rotation_x, rotation_z
 from dnet.sim.arms import ArmModel, Placement
-from dnet.sim.bullet import pybullet, quiet
+from dnet.sim.bullet import pybullet, quiet, start_server
 from dnet.sim.psm import JOINT_NAMES, LOWER, TIP, UPPER, Psm
 from dnet.sim.psm_links import LINK_JOINTS, link_frames
 from dnet.sim.urdf import psm_urdf
