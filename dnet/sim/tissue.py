@@ -15,7 +15,7 @@ LEAST_FACE = 4
 """Nodes that make an end flat."""
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def tissue_mesh(tissue: Tissue) -> TetrahedralMesh:
     """Return the object at rest in its own frame: centred over the origin, lying on z = 0."""
     if tissue.shape == "cylinder":
