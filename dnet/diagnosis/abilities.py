@@ -16,7 +16,8 @@ class Ability:
     """A function that does it once and says what came out, as in `module:name`,
     the module of this package unless it has a dot."""
     process: str
-    """Attempts of one process share what they import; processes run beside each other."""
+    """Attempts of one process share what they import, which is most of their time; processes run
+    beside each other. Those of `networks` import torch and numba, those of `others` neither."""
     needed: bool = True
     """Whether dnet is broken without; else it only lacks something."""
     thorough: str = ""
@@ -38,21 +39,21 @@ ABILITIES = (
         ("record", "servo"),
         ("pybullet",),
         "laboratory_attempts:step",
-        "physics",
+        "others",
     ),
     Ability(
         "planning",
         ("record", "servo"),
         ("ompl",),
         "laboratory_attempts:plan",
-        "physics",
+        "others",
     ),
     Ability(
         "logs",
         ("record", "train", "servo", "inspect", "play"),
         _LOGS,
         "laboratory_attempts:log",
-        "physics",
+        "others",
     ),
     Ability(
         "networks",
@@ -62,34 +63,41 @@ ABILITIES = (
         "networks",
         thorough="learning_attempts:predict_fused",
     ),
-    Ability("training", ("train",), _NETWORKS, "learning_attempts:train", "networks"),
+    Ability(
+        "training",
+        ("train",),
+        _NETWORKS,
+        "learning_attempts:train",
+        "networks",
+        thorough="learning_attempts:train_by_optimizer",
+    ),
     Ability(
         "recordings",
         ("servo", "play"),
         ("rerun",),
         "showing_attempts:write",
-        "showing",
+        "others",
     ),
     Ability(
         "viewer",
         ("play",),
         ("rerun_cli",),
         "showing_attempts:start_viewer",
-        "showing",
+        "others",
     ),
     Ability(
         "pictures",
         ("inspect", "evaluate", "play --film"),
         ("matplotlib", "PIL"),
         "showing_attempts:draw",
-        "showing",
+        "others",
     ),
     Ability(
         "window",
         ("play", "servo --view"),
         (),
         "showing_attempts:find_screen",
-        "showing",
+        "others",
         needed=False,
         remedy="draw with --screenshot, or write --save OUT.rrd and open it elsewhere",
     ),
@@ -133,7 +141,7 @@ ABILITIES = (
         ("evaluate paper", "reproduce"),
         ("jinja2", "plotly"),
         "showing_attempts:write_report",
-        "exchange",
+        "others",
         needed=False,
     ),
     Ability(
@@ -141,7 +149,7 @@ ABILITIES = (
         ("servo --goal a.ply",),
         ("trimesh", "pypcd4"),
         "exchange_attempts:read_clouds",
-        "exchange",
+        "networks",
         needed=False,
     ),
     Ability(
@@ -149,7 +157,7 @@ ABILITIES = (
         ("inspect export",),
         ("h5py",),
         "exchange_attempts:write_hdf5",
-        "exchange",
+        "others",
         needed=False,
     ),
     Ability(
@@ -157,7 +165,7 @@ ABILITIES = (
         ("evaluate keypoints",),
         ("pycpd",),
         "exchange_attempts:register",
-        "exchange",
+        "networks",
         needed=False,
     ),
     Ability(
@@ -165,7 +173,7 @@ ABILITIES = (
         ("record s3://", "train s3://"),
         ("s3fs",),
         "cluster_attempts:store",
-        "stores",
+        "others",
         needed=False,
     ),
     Ability(
@@ -173,7 +181,7 @@ ABILITIES = (
         ("record --ray",),
         ("ray",),
         "cluster_attempts:pickle_task",
-        "stores",
+        "others",
         needed=False,
         thorough="cluster_attempts:run_task",
     ),

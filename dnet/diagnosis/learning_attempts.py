@@ -1,6 +1,7 @@
 """Whether networks can be asked and trained, on a GPU too, and whether they go to other formats."""
 
 import tempfile
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
@@ -46,20 +47,40 @@ def _predicted(what: str) -> str:
 
 
 def train() -> str:
+    """Let a small network learn from one pair, by steps of one size down the slope.
+
+    torch's optimizers import its compiler first, which takes seconds.
+    """
+
+    def descend(weights: list[torch.nn.Parameter]) -> None:
+        with torch.no_grad():
+            for weight in weights:
+                if weight.grad is not None:
+                    weight.sub_(1e-3 * weight.grad.sign())
+
+    return _trained(lambda weights: lambda: descend(weights))
+
+
+def train_by_optimizer() -> str:
+    """Let it learn as a training does, by an optimizer of torch."""
+    return _trained(lambda weights: torch.optim.Adam(weights, lr=1e-3).step)
+
+
+def _trained(descent: Callable[[list[torch.nn.Parameter]], Callable[[], object]]) -> str:
     """Let a small network learn from one pair for some steps, on the processor."""
     torch.manual_seed(0)
     network = DeformerNet(DeformerNetConfig(points=128))
     pair = [prepare(_cloud(128, raised=raised), network.config) for raised in (0.0, 0.02)]
     here, there = (stack([cloud]) for cloud in pair)
     truth = torch.tensor([[0.0, 0.0, 0.02]])
-    optimizer = torch.optim.Adam(network.parameters(), lr=1e-3)
+    descend = descent(list(network.parameters()))
     losses = []
     with step_by_step():
         for _ in range(3):
             loss = 1e6 * (network(here, there) - truth).square().mean()
-            optimizer.zero_grad()
+            network.zero_grad()
             loss.backward()
-            optimizer.step()
+            descend()
             losses.append(float(loss.detach()))
     if not losses[-1] < losses[0]:
         raise RuntimeError(f"a network that learns from one pair has losses {losses}")
