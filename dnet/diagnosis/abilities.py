@@ -162,7 +162,7 @@ ABILITIES = (
     ),
     Ability(
         "registration",
-        ("evaluate keypoints",),
+        ("evaluate keypoints --drift",),
         ("pycpd",),
         "exchange_attempts:register",
         "networks",
