@@ -55,6 +55,10 @@ $(VENV)/.report: $(VENV)/.run
 	$(INSTALL) -e ".[report]"
 	@touch $@
 
+$(VENV)/.docs: $(VENV)/.run
+	@test -x $(BIN)/mkdocs || $(INSTALL) -e ".[docs]"
+	@touch $@
+
 $(VENV)/.develop: $(VENV)/.run
 	$(INSTALL) -e ".[dev]"
 	@touch $@
@@ -104,7 +108,7 @@ pyright:
 layers:
 	$(BIN)/lint-imports
 
-docs: ## Build the documentation into site/
+docs: $(VENV)/.docs ## Build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 benchmark: develop ## Measure how fast the laboratory is, as ratios
