@@ -1,5 +1,6 @@
 """PyBullet, without what it prints from C and what it would keep of every file that it reads."""
 
+import ctypes
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,9 @@ def quiet() -> Iterator[None]:
             os.dup2(nowhere, stream)
         yield
     finally:
+        # C keeps what it prints into a file or a pipe until there is more of it, or the end.
+        if os.name == "posix":
+            ctypes.CDLL(None).fflush(None)
         for stream, copy in kept:
             os.dup2(copy, stream)
             os.close(copy)

@@ -1,8 +1,21 @@
-"""A Bullet server reads its files, and keeps none of them."""
+"""A Bullet server keeps none of the files that it reads, and what it prints to itself."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 from dnet.sim.bullet import pybullet, start_server
+
+
+PRINTING = """
+import ctypes
+from dnet.sim.bullet import quiet
+
+with quiet():
+    ctypes.CDLL(None).puts(b"Nodes: 405")
+print("a result")
+"""
 
 
 def corners(path: Path, text: str) -> int:
@@ -24,3 +37,16 @@ def test_a_file_that_was_read_is_not_kept(tmp_path: Path) -> None:
     path = tmp_path / "surface.obj"
     # Kept by its name, as PyBullet would have it, the second would be the first.
     assert (corners(path, triangle), corners(path, square)) == (3, 4)
+
+
+def test_what_c_code_prints_goes_nowhere_though_it_prints_into_a_pipe() -> None:
+    # Where this is set, C keeps nothing back.
+    buffering = {name: text for name, text in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    printed = subprocess.run(
+        [sys.executable, "-c", PRINTING],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=buffering,
+    )
+    assert (printed.stdout, printed.stderr) == ("a result\n", "")
