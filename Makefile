@@ -56,12 +56,12 @@ $(VENV)/.report: $(VENV)/.run
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.run
-	@test -x $(BIN)/mkdocs || $(INSTALL) -e ".[docs]"
+	$(INSTALL) -e ".[docs]"
 	@touch $@
 
 $(VENV)/.develop: $(VENV)/.run
 	$(INSTALL) -e ".[dev]"
-	@touch $@
+	@touch $@ $(VENV)/.docs
 
 develop: setup $(VENV)/.develop ## The same, and what its tests and checks need
 
