@@ -28,8 +28,8 @@ class Doctor:
     """
 
     thorough: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Also do what takes a minute: compile the kernels of the networks, draw a screenshot, start a
-    Ray cluster."""
+    """Also do what takes a minute: compile the kernels of the networks, train with an optimizer,
+    draw a screenshot, start a Ray cluster."""
     json: tyro.conf.FlagCreatePairsOff[bool] = False
     """Print one JSON object instead of tables."""
 
