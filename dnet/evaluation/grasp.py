@@ -69,7 +69,7 @@ def cases_of(table: FrameTable, count: int, *, seed: int = 0) -> list[Case]:
             rests.append(int(found[0]))
             shapes.append(random.permutation(others).tolist())
     if (total := sum(map(len, shapes))) < count:
-        raise TooFew("number of pairs of a rest shape and another", total, count)
+        raise TooFew("number of unseen pairs for --cases to choose from", total, count)
     cases: list[Case] = []
     turn = 0
     while len(cases) < count:
