@@ -7,7 +7,6 @@ from pathlib import Path
 
 from dnet.sim.bullet import pybullet, start_server
 
-
 PRINTING = """
 import ctypes
 from dnet.sim.bullet import quiet
