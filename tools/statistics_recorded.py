@@ -165,5 +165,6 @@ def _mapping(result: Mapping[str, Any], key: str) -> Mapping[str, Any] | None:
 
 def _number(value: object) -> float | None:
     # A whole number in JSON may be larger than any float.
-    known = isinstance(value, int | float) and abs(value) <= float_info.max
-    return float(value) if known else None
+    if isinstance(value, int | float) and abs(value) <= float_info.max:
+        return float(value)
+    return None
