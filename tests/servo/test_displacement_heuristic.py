@@ -118,7 +118,7 @@ def test_a_point_is_pulled_by_what_it_has_beyond_the_mean_around_it() -> None:
     assert bump.max() > 0.005
     # Along its own displacement: what moves less than its surroundings is not pulled.
     lift = bumped(points) - points
-    dent = pulls(Keypoints(points, points + np.float32([0.0, 0.0, 0.06]) - lift, 0.0))
+    dent = pulls(Keypoints(points, points + np.array([0.0, 0.0, 0.06], np.float32) - lift, 0.0))
     assert dent[away < 0.01].max() < 1e-4
 
 

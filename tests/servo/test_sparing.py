@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dnet.servo.sparing import LEAST_MOTION, SparingPlanner
-from dnet.types import Joints, Plan, Point
+from dnet.types import Joints, Plan, PlanStatus, Point
 from tests.servo.slab import Slab
 
 MOTION = np.array([0.03, 0.0, 0.04])
@@ -86,7 +86,7 @@ def test_what_is_foreseen_is_the_plan_and_not_what_was_asked_for() -> None:
 
 
 @pytest.mark.parametrize("obstacle", ["failed", "partial"])
-def test_why_the_shorter_motion_is_not_free_is_said_too(obstacle: str) -> None:
+def test_why_the_shorter_motion_is_not_free_is_said_too(obstacle: PlanStatus) -> None:
     class Walled(Slab):
         def plan(
             self,
