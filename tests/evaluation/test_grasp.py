@@ -46,7 +46,7 @@ def test_cases_are_even_over_episodes_and_each_comes_once(table: FrameTable) -> 
     assert names != [case.name for case in cases_of(table, 7, seed=1)]
     for case in cases:
         assert np.linalg.norm(case.initial - case.truth, axis=1).min() < 0.03
-    with pytest.raises(TooFew, match="rest shape and another is 15, must be at least 16"):
+    with pytest.raises(TooFew, match="--cases to choose from is 15, must be at least 16"):
         cases_of(table, 16)
 
 
