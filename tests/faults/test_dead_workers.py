@@ -57,7 +57,8 @@ def kill_while_reading(stream: Stream[GroupBatch]) -> None:
 
 
 def lose_the_loader(folder: str) -> None:
-    stream = load_groups(write(Path(folder), 3), share=Share(workers=1))
+    # Of many more batches than a worker reads ahead: it is not done when it is killed.
+    stream = load_groups(write(Path(folder), 40), share=Share(workers=1))
     # Torch tells of a dead worker by a signal, wherever this process then is.
     with pytest.raises(WorkerDied, match=r"read ahead was killed.*fewer --workers"):
         kill_while_reading(stream)
