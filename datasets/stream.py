@@ -29,9 +29,13 @@ def dead_workers() -> Iterator[None]:
     except RuntimeError as error:
         if not any(words in str(error) for words in DEAD):
             raise
-        raise WorkerDied(
-            "read ahead", "what was put down is kept; fewer --workers take less memory, 0 none"
-        ) from error
+        raise _died() from error
+
+
+def _died() -> WorkerDied:
+    return WorkerDied(
+        "read ahead", "what was put down is kept; fewer --workers take less memory, 0 none"
+    )
 
 
 @runtime_checkable
@@ -117,6 +121,11 @@ class Stream(Generic[Batch_co]):
                     batch = next(batches)
                 except StopIteration:
                     return
+                except (ConnectionError, EOFError) as error:
+                    if not self._loader.num_workers:
+                        raise
+                    # The batch is ready, but only its maker could hand it over.
+                    raise _died() from error
             yield batch
 
     def state_dict(self) -> dict[str, Any]:
