@@ -29,7 +29,7 @@ MOST, POWER = 20, 4
 """How many keypoints count, as in the paper, and the power of the pull by which they do."""
 NEAR, AROUND = 0.006, 0.025
 """Standard deviations of the Gaussians that a keypoint and its surroundings are averaged by, in
-metres: about the distance between keypoints, and a third of the length of a box. All four were
+metres: about the distance between keypoints, and a quarter of the length of a box. All four were
 chosen on 60 episodes that networks had learned from, which of keypoints, that learn from clouds
 alone, tell as much as others, and on the 18 that had been held out."""
 FAINT = 1e-3
