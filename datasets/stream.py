@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from time import sleep
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from torch.utils.data import DataLoader, Sampler
@@ -11,6 +12,9 @@ from dnet.errors import OtherStream, WorkerDied
 
 DEAD = ("is killed by signal", "exited unexpectedly")
 """What torch says of a worker that is no more, in a plain RuntimeError."""
+
+SIGNAL = 1.0
+"""Seconds in which the signal of a death comes."""
 
 Batch_co = TypeVar("Batch_co", covariant=True)
 
@@ -124,7 +128,9 @@ class Stream(Generic[Batch_co]):
                 except (ConnectionError, EOFError) as error:
                     if not self._loader.num_workers:
                         raise
-                    # The batch is ready, but only its maker could hand it over.
+                    # The batch is ready, but only its maker could hand it over. Of that one's
+                    # death torch hears by a signal: better here than in the midst of other work.
+                    sleep(SIGNAL)
                     raise _died() from error
             yield batch
 
