@@ -59,17 +59,6 @@ def test_a_warm_up_is_no_leak() -> None:
     assert len(settled(rounds(lambda _: 1.0)[:12])) == 9
 
 
-def test_neither_a_single_dip_nor_a_single_step_is_a_trend() -> None:
-    random = np.random.default_rng(0)
-
-    def memory(time: float) -> float:
-        dip, step = 100.0 * (0.98 < time < 1.0), 5.0 * (time > 1.7)
-        return 500 - dip + step + random.normal(scale=0.3)
-
-    assert trend(rounds(memory), "anonymous").verdict == "flat"
-    assert trend(rounds(memory), "anonymous").lowest < 410e6
-
-
 def test_what_never_changes_is_flat_and_a_thread_an_hour_is_not() -> None:
     assert trend(rounds(lambda _: 1.0), "threads").verdict == "flat"
     assert trend(rounds(lambda _: 1.0), "disk").verdict == "flat"

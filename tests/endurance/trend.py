@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import theilslopes
+from scipy.stats import linregress, t
 
 from tests.endurance.figures import Figures
 
@@ -53,7 +53,7 @@ class Trend:
     rise: float
     """Of the line, an hour."""
     error: float
-    """How far off the rise may be, with `CONFIDENCE`."""
+    """Half the width of the interval that the rise lies in with `CONFIDENCE`."""
     bound: float
     """The most that it may rise an hour."""
 
@@ -73,9 +73,6 @@ def settled(rows: Sequence[Figures]) -> Sequence[Figures]:
 def trend(rows: Sequence[Figures], name: str) -> Trend:
     """Fit a line to one column, three rounds after the warm-up at least.
 
-    Its slope is the median of those between any two rounds (Theil and Sen): neither one round in
-    which the allocator gives much back decides about it, nor one step.
-
     Args:
         rows: All rounds.
         name: Of the column.
@@ -83,9 +80,11 @@ def trend(rows: Sequence[Figures], name: str) -> Trend:
     rounds = settled(rows)
     hours = np.array([row.hours for row in rounds])
     values = np.array([float(getattr(row, name)) for row in rounds])
-    line = theilslopes(values, hours, alpha=CONFIDENCE)
-    rise = float(line.slope)
-    error = max(float(line.high_slope) - rise, rise - float(line.low_slope))
+    rise, error = 0.0, 0.0
+    if np.ptp(values):  # SciPy knows no error of a line through equal values
+        line = linregress(hours, values)
+        rise = float(line.slope)
+        error = float(line.stderr) * float(t.ppf((1 + CONFIDENCE) / 2, len(rounds) - 2))
     median = float(np.median(values))
     return Trend(
         name=name,
