@@ -128,15 +128,18 @@ class Train:
         from rich.console import Console
 
         from dnet.files.one_writer import one_writer
-        from dnet.training.allocation import keep_pages
+        from dnet.training.allocation import kept_pages
         from dnet.training.parallel import meeting, this_process
 
         self._check()
         process = this_process()
         device = self._device(process)
         console = Console(stderr=True, quiet=not process.first)
-        keep_pages()
-        with meeting(process, device), one_writer(self.out) if process.first else nullcontext():
+        with (
+            kept_pages(),
+            meeting(process, device),
+            one_writer(self.out) if process.first else nullcontext(),
+        ):
             self._train(process, device, console)
 
     def _train(self, process: "Process", device: "torch.device", console: "Console") -> None:

@@ -12,6 +12,7 @@ time on one thread, and the clock on several.
 import multiprocessing
 import resource
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from time import perf_counter, process_time
 from typing import Literal
@@ -27,7 +28,7 @@ from dnet.geometry.sampling import farthest_points
 from dnet.nets.deformernet import DeformerNet, DeformerNetConfig, prepare
 from dnet.nets.fused import step_by_step
 from dnet.nets.neighbourhoods import Size, stack
-from dnet.training.allocation import keep_pages
+from dnet.training.allocation import kept_pages
 from dnet.training.tasks import new_network
 from dnet.types import Cloud
 from tests.nets import reference
@@ -82,12 +83,9 @@ class Benchmark:
 def measure(formulation: Formulation, size: Size, threads: int) -> Measured:
     """Return the figures of one formulation, measured in this process."""
     torch.set_num_threads(threads)
-    keep_pages()
     clock = process_time if threads == 1 else perf_counter
-    if formulation == "step by step":
-        with step_by_step():
-            return _measure(formulation, size, clock)
-    return _measure(formulation, size, clock)
+    with kept_pages(), step_by_step() if formulation == "step by step" else nullcontext():
+        return _measure(formulation, size, clock)
 
 
 def _measure(formulation: Formulation, size: Size, clock: Callable[[], float]) -> Measured:
