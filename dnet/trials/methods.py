@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from dnet.servo.grasp_pickers import FarthestPoint, MostDisplaced, NetworkPicker
 from dnet.servo.online import OnlineHu
 from dnet.servo.pickers import Picker, TruePoint
 from dnet.servo.random_trials import RandomTree
-from dnet.training.checkpoints import load_kind
+from dnet.training.checkpoints import load_kind, weights_file
 from dnet.trials.goals import Task
 from dnet.trials.request import ControllerName, Trial
 from dnet.weights import DEFORMERNET, DENSE, HU, KEYPOINTS, REGRESSOR
+
+N = TypeVar("N", DeformerNet | OnnxDeformerNet, HuNet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,14 +140,27 @@ PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
 """By `GraspName`."""
 
 
-@lru_cache(maxsize=4)
 def _network(checkpoint: Path | None) -> DeformerNet | OnnxDeformerNet:
-    return dnet.load() if checkpoint is None else dnet.load(checkpoint)
+    return dnet.load() if checkpoint is None else _as_it_is(dnet.load, checkpoint)
+
+
+def _hu_network(checkpoint: Path | None) -> HuNet:
+    return _as_it_is(_load_hu, checkpoint or HU)
+
+
+def _load_hu(path: Path) -> HuNet:
+    return load_kind(path, HuNet)
+
+
+def _as_it_is(load: Callable[[Path], N], path: Path) -> N:
+    """Load a network, but not twice, unless its file is another one meanwhile."""
+    state = weights_file(path).stat()
+    return _kept(load, path, state.st_ino, state.st_mtime_ns)
 
 
 @lru_cache(maxsize=4)
-def _hu_network(checkpoint: Path | None) -> HuNet:
-    return load_kind(checkpoint or HU, HuNet)
+def _kept(load: Callable[[Path], N], path: Path, *_: int) -> N:
+    return load(path)
 
 
 def points_of(controller: ControllerName, checkpoint: Path | None) -> int:

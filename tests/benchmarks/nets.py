@@ -12,6 +12,7 @@ time on one thread, and the clock on several.
 import multiprocessing
 import resource
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from time import perf_counter, process_time
@@ -75,8 +76,9 @@ class Benchmark:
         for threads in self.threads:
             found: dict[Formulation, Measured] = {}
             for formulation in FORMULATIONS:
-                with context.Pool(1) as pool:
-                    found[formulation] = pool.apply(measure, (formulation, self.size, threads))
+                with ProcessPoolExecutor(1, mp_context=context) as pool:
+                    task = pool.submit(measure, formulation, self.size, threads)
+                    found[formulation] = task.result()
             console.print(_table(found, f"{self.size} size, 2048 points, {threads} threads"))
 
 

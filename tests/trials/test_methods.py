@@ -1,12 +1,15 @@
 """What methods know before a run begins."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from dnet.laboratory import LaboratorySettings, laboratory
-from dnet.nets.deformernet import DeformerNet
+from dnet.nets.deformernet import DeformerNet, DeformerNetConfig
+from dnet.training.checkpoints import save
 from dnet.trials.goals import read_task
-from dnet.trials.methods import CONTROLLERS, Setting
+from dnet.trials.methods import CONTROLLERS, Setting, points_of
 from dnet.trials.request import Trial
 from dnet.types import Cloud
 
@@ -31,3 +34,13 @@ def test_no_step_waits_for_the_goal_to_be_encoded(
     encoded.clear()
     controller.predict(task.goal.cloud + np.float32(0.001), task.goal.cloud)
     assert encoded == ["current cloud"]
+
+
+def test_a_network_that_was_trained_anew_is_not_the_one_that_lay_there_before(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "best.safetensors"
+    for points in (512, 1024):
+        save(path, DeformerNet(DeformerNetConfig(points=points)))
+        assert points_of("deformernet", tmp_path) == points
+        assert points_of("deformernet", tmp_path) == points
