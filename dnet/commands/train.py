@@ -60,7 +60,7 @@ class Train:
     """What to begin with: a run, a .safetensors file, the network that `shipped`, or `random`
     weights. A DeformerNet and `hu` begin with random ones, unless given, the others with what the
     DeformerNet that shipped knows: `dense` with all of it, `grasp` and `keypoints` with its
-    encoder. Options of the network must be those that it has."""
+    encoder. Options of the network must be those that it has, but for --points."""
     epochs: int | float = 100
     """How often every frame is seen, or every pair with other --pairs (paper: 100, of 30,000
     frames)."""

@@ -32,7 +32,7 @@ def draw_cases(cases: Sequence[Case], answers: Mapping[str, Answers], path: Path
         for place, (which, number) in enumerate(picked.items()):
             case, index = cases[int(number)], int(number)
             first = 6 * row + 2 * place + 1
-            title = f"{name}, {which}: {1e3 * found.distances[index]:.1f} mm"
+            title = f"{name}\n{which}: {1e3 * found.distances[index]:.1f} mm"
             axes = [figure.add_subplot(len(answers), 6, first + k, projection="3d") for k in (0, 1)]
             _draw(axes[0], case.initial, _OBJECT, title)
             _mark(axes[0], case.truth, _TRUTH)

@@ -153,8 +153,8 @@ def begin_with(model: Network, path: Path) -> None:
         found = f"holds {type(held).__name__}, not {' or '.join(wanted)}"
         raise BadCheckpoint(path, found, _HINT)
     for name, value in asdict(model.config).items():
-        # Another network may look at more points or fewer.
-        if (other := getattr(held.config, name)) != value and (alike or name != "points"):
+        # It may have looked at more points or fewer.
+        if (other := getattr(held.config, name)) != value and name != "points":
             why = f"is of a network with {name} {other}, not {value}"
             raise BadCheckpoint(path, why, "give the options that it was trained with")
     if isinstance(held, DeformerNet) and isinstance(model, DensePredictor):

@@ -226,10 +226,11 @@ def test_json_that_was_written_reads_back(tmp_path: Path, content: dict[str, Any
 def test_a_training_begins_with_the_weights_of_a_network_like_it(
     model: DeformerNet, saved: Path
 ) -> None:
-    other = new_network(SMALL, seed=1)
-    begin_with(other, saved.parent)
-    for name, weights in other.state_dict().items():
-        assert torch.equal(weights, model.state_dict()[name])
+    for points in (SMALL.points, 2 * SMALL.points):
+        other = new_network(replace(SMALL, points=points), seed=1)
+        begin_with(other, saved.parent)
+        for name, weights in other.state_dict().items():
+            assert torch.equal(weights, model.state_dict()[name])
     unlike = new_network(replace(SMALL, norm="batch"), seed=1)
     with pytest.raises(BadCheckpoint, match="with norm group, not batch; give the options"):
         begin_with(unlike, saved)
