@@ -55,6 +55,7 @@ class Ablations:
         from dnet.datasets.stores import as_place
         from dnet.errors import TooFew, UnknownAblation
         from dnet.evaluation.ablations import ABLATIONS, read_ablation, table_of
+        from dnet.files.whole_file import write_whole
         from dnet.training.run import is_finished
 
         for name in self.only:
@@ -75,9 +76,7 @@ class Ablations:
                 return
             found.append(read_ablation(name, run))
         table = table_of(found)
-        part = self.out / ".ablations.md.part"
-        part.write_text(table, encoding="utf-8")
-        part.replace(self.out / "ablations.md")
+        write_whole(self.out / "ablations.md", table.encode())
         Console().print(Markdown(table))
 
     def _epochs(self, index: "Index", pairs: "PairKind") -> float:

@@ -41,6 +41,7 @@ class Importance:
 
         from dnet.commands.servo_batch import finish
         from dnet.evaluation.servo_table import servo_table
+        from dnet.files.whole_file import write_whole
 
         plain = self.options.trial(self.goal, self.out, controller=self.controller)
         good = replace(plain, out=self.out / "good")
@@ -48,9 +49,7 @@ class Importance:
         scores = finish([good, bad], jobs=1, what="servoing")
         names = (f"good ({good.grasp})", f"bad ({bad.grasp})")
         table = servo_table([(name, [score]) for name, score in zip(names, scores, strict=True)])
-        part = self.out / ".importance.md.part"
-        part.write_text(table, encoding="utf-8")
-        part.replace(self.out / "importance.md")
+        write_whole(self.out / "importance.md", table.encode())
         print(table, end="")
         Console().print(
             f"see both with `dnet play {good.out} {bad.out}`", highlight=False, soft_wrap=True

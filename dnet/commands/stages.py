@@ -9,6 +9,7 @@ from rich.console import Console
 
 from dnet.errors import BadReport, OccupiedOutput, TooLarge
 from dnet.files.sizes import read_json
+from dnet.files.whole_file import write_whole
 
 
 @runtime_checkable
@@ -62,10 +63,7 @@ class Stages:
 
     def _write(self) -> None:
         state = {"options": self._options, "seconds": self.seconds, "stopped": self._stopped}
-        self._file.parent.mkdir(parents=True, exist_ok=True)
-        part = self._file.with_suffix(".part")
-        part.write_text(json.dumps(state, indent=2), encoding="utf-8")
-        part.replace(self._file)
+        write_whole(self._file, json.dumps(state, indent=2).encode())
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
 from dnet.evaluation.grasp import Answers, Case
+from dnet.files.whole_file import write_whole
 from dnet.types import Cloud, Point
 
 _OBJECT, _GOAL, _TRUTH, _CHOICE = "#b5715a", "#5590b0", "#1d8a3a", "#1f4fd1"
@@ -41,10 +42,7 @@ def draw_cases(cases: Sequence[Case], answers: Mapping[str, Answers], path: Path
     content = BytesIO()
     with rc_context({"text.parse_math": False}):
         figure.savefig(content, format="png", dpi=80)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    part.write_bytes(content.getvalue())
-    part.replace(path)
+    write_whole(path, content.getvalue())
 
 
 def _draw(axes: Axes3D, cloud: Cloud, colour: str, title: str) -> None:

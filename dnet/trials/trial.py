@@ -12,6 +12,7 @@ import numpy as np
 import dnet
 from dnet.datasets.reader import EpisodeReader
 from dnet.errors import DnetError, NoGrasp, OtherRun, ShortCloud
+from dnet.files.whole_file import write_whole
 from dnet.laboratory import Laboratory
 from dnet.recorders.run_sinks import OpenView
 from dnet.servo.controllers import Controller
@@ -232,7 +233,4 @@ def clear(out: Path) -> None:
 
 def refuse(out: Path, error: DnetError) -> None:
     """Write down why a run could not begin: it counts like any other."""
-    out.mkdir(parents=True, exist_ok=True)
-    part = out / f"{REFUSED}.part"
-    part.write_text(json.dumps({"error": str(error)}))
-    part.replace(out / REFUSED)
+    write_whole(out / REFUSED, json.dumps({"error": str(error)}).encode())
