@@ -21,7 +21,7 @@ RERUN = Path(sys.executable).parent / "rerun"
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("chain") / "demo"
-    main(["demo", "--out", str(out), "--pairs", "2", "--shapes", "3", "--minutes", "0.1"])
+    main(["demo", "--out", str(out), "--pairs", "2", "--shapes", "3", "--epochs", "30"])
     return out
 
 
@@ -49,7 +49,7 @@ def test_a_second_call_of_the_demo_does_nothing_twice(
     demo: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = {path: path.stat().st_mtime_ns for path in demo.rglob("*")}
-    main(["demo", "--out", str(demo), "--pairs", "2", "--shapes", "3", "--minutes", "0.1"])
+    main(["demo", "--out", str(demo), "--pairs", "2", "--shapes", "3", "--epochs", "30"])
     assert {path: path.stat().st_mtime_ns for path in demo.rglob("*")} == before
     printed = capsys.readouterr().out
     assert printed.count("done before") == printed.count("$ dnet") == 7
