@@ -106,14 +106,18 @@ def _plot(found: Sequence[Training]) -> BarPlot:
 
 
 def best_of(found: Sequence[Training], model: str, *, few: bool) -> Training | None:
-    """Return the training of a model that is best on unseen shapes, of those judged on them."""
+    """Return the training of a model that is best on unseen shapes, of those judged on them.
+
+    Of trainings on clouds of different sizes, those on the largest count: sparser ones are another
+    condition.
+    """
     known = [
-        (errors.mse_mm2, one.name, one)
+        (-one.points, errors.mse_mm2, one.name, one)
         for one in found
         if one.model == model and one.few == few
         if (errors := one.error("unseen shapes")) is not None
     ]
-    return min(known, default=(0.0, "", None))[2]
+    return min(known, default=(0, 0.0, "", None))[3]
 
 
 def _architecture(folder: Path, asked: Asked | None) -> Claim:

@@ -42,6 +42,8 @@ class Training:
     """`deformernet` or `hu`."""
     few: bool
     """Whether it was on a few episodes alone."""
+    points: int
+    """Of the clouds that it sees."""
     detail: str
     """What sets it apart from others of its model."""
     errors: tuple[Errors, ...]
@@ -84,6 +86,7 @@ def read_training(run: Path) -> Training:
             run.name,
             str(network["model"]),
             few,
+            int(network["points"]),
             _detail(network, config.get("data", {}), few=few),
             tuple(
                 Errors(
@@ -106,7 +109,11 @@ def read_training(run: Path) -> Training:
 
 def _detail(network: Mapping[str, Any], data: Mapping[str, Any], *, few: bool) -> str:
     frames = data.get("frames", {}).get("training")
-    told = [f"{frames} frames" if frames else "", "a few episodes" if few else ""]
+    told = [
+        f"{frames} frames" if frames else "",
+        "a few episodes" if few else "",
+        f"{network['points']} points",
+    ]
     if network["model"] == "hu":
         told.append("ReLU" if network.get("relu", True) else "linear")
     else:
