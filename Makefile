@@ -59,8 +59,9 @@ $(VENV)/.docs: $(VENV)/.run
 	$(INSTALL) -e ".[docs]"
 	@touch $@
 
+# Python compiles what tests import when they do; pip would compile, and write, everything.
 $(VENV)/.develop: $(VENV)/.run
-	$(INSTALL) -e ".[dev]"
+	$(INSTALL) --no-compile -e ".[dev]"
 	@touch $@ $(VENV)/.docs
 
 develop: setup $(VENV)/.develop ## The same, and what its tests and checks need

@@ -122,7 +122,8 @@ def _bars(plot: BarPlot, objects: Any) -> Any:
         )
     order = [bar.label for bar in plot.bars][::-1]
     figure.update_yaxes(categoryorder="array", categoryarray=order, automargin=True, **_AXIS)
-    figure.update_xaxes(title_text=plot.x, rangemode="tozero", **_AXIS)
+    scale = {"type": "log"} if plot.logarithmic else {"rangemode": "tozero"}
+    figure.update_xaxes(title_text=plot.x, **scale, **_AXIS)
     figure.update_layout(
         height=BAR_HEIGHT * len(order) + 110,
         margin={"l": 70, "r": 20, "t": 30, "b": 60},

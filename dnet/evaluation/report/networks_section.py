@@ -101,7 +101,11 @@ def _plot(found: Sequence[Training]) -> BarPlot:
         if (errors := one.error(part)) is not None
     )
     return BarPlot(
-        "networks-errors", "Squared error on any two frames", "MSE, mean over xyz, mm²", bars
+        "networks-errors",
+        "Squared error on any two frames",
+        "MSE, mean over xyz, mm²",
+        bars,
+        logarithmic=True,
     )
 
 

@@ -79,6 +79,10 @@ def _bars(plot: BarPlot) -> Figure:
         axes.plot([bar.low, bar.high], [place, place], color=INK, linewidth=1)
     axes.set_yticks(range(len(plot.bars)), [bar.label for bar in plot.bars])
     axes.invert_yaxis()
+    axes.set_axisbelow(True)
+    if plot.logarithmic:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel(plot.x)
     return figure
 

@@ -126,6 +126,8 @@ class BarPlot:
     x: str
     """What their lengths show, and its unit."""
     bars: tuple[Bar, ...]
+    logarithmic: bool = False
+    """Whether values are of several magnitudes, so that their ratios are what is to be seen."""
 
 
 @dataclass(frozen=True, slots=True)
