@@ -277,7 +277,7 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, minutes=0.0), TooShort, "--minutes is 0.0, must be above 0"),
         (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),
         (replace(good, weights="nowhere"), BadCheckpoint, "nowhere does not exist"),
-        (replace(good, weights="shipped"), BadCheckpoint, "with points 2048, not 136"),
+        (replace(good, weights="shipped", norm="batch"), BadCheckpoint, "with norm group, not"),
         (replace(good, model="hu", weights="shipped"), BadCheckpoint, "hu.safetensors is of a"),
         (replace(good, episodes=0), TooFew, "--episodes is 0, must be at least 1"),
         (replace(good, relu=False), UnusedOption, "--no-relu does nothing without --model hu"),
