@@ -278,7 +278,11 @@ def refusals(episodes: Path, tmp_path: Path) -> list[tuple[Train, type[DnetError
         (replace(good, validation=2.0), NotAFraction, "validation fraction is 2.0"),
         (replace(good, weights="nowhere"), BadCheckpoint, "nowhere does not exist"),
         (replace(good, weights="shipped", norm="batch"), BadCheckpoint, "with norm group, not"),
-        (replace(good, model="hu", weights="shipped"), BadCheckpoint, "hu.safetensors is of a"),
+        (
+            replace(good, model="hu", relu=False, weights="shipped"),
+            BadCheckpoint,
+            "hu.safetensors is of a network with relu True, not False",
+        ),
         (replace(good, episodes=0), TooFew, "--episodes is 0, must be at least 1"),
         (replace(good, relu=False), UnusedOption, "--no-relu does nothing without --model hu"),
         (replace(good, model="hu", norm="batch"), UnusedOption, "without another --model"),
