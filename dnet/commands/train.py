@@ -129,6 +129,7 @@ class Train:
 
         from dnet.files.one_writer import one_writer
         from dnet.training.allocation import kept_pages
+        from dnet.training.determinism import repeatable
         from dnet.training.parallel import meeting, this_process
 
         self._check()
@@ -137,6 +138,7 @@ class Train:
         console = Console(stderr=True, quiet=not process.first)
         with (
             kept_pages(),
+            repeatable(),
             meeting(process, device),
             one_writer(self.out) if process.first else nullcontext(),
         ):
