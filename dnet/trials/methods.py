@@ -141,7 +141,7 @@ PICKERS: Mapping[str, Callable[[Setting], Picker]] = {
 
 
 def _network(checkpoint: Path | None) -> DeformerNet | OnnxDeformerNet:
-    return dnet.load() if checkpoint is None else _as_it_is(dnet.load, checkpoint)
+    return _as_it_is(dnet.load, checkpoint or DEFORMERNET)
 
 
 def _hu_network(checkpoint: Path | None) -> HuNet:

@@ -44,3 +44,13 @@ def test_a_network_that_was_trained_anew_is_not_the_one_that_lay_there_before(
         save(path, DeformerNet(DeformerNetConfig(points=points)))
         assert points_of("deformernet", tmp_path) == points
         assert points_of("deformernet", tmp_path) == points
+
+
+def test_the_network_that_ships_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    points_of("deformernet", None)
+
+    def read(*_: object) -> None:
+        raise AssertionError("read again")
+
+    monkeypatch.setattr("dnet.training.checkpoints.load", read)
+    assert points_of("deformernet", None) == 2048
