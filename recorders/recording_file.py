@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from dnet.errors import Unwritten
-from dnet.recorders.streams import open_stream, save_stream
+from dnet.recorders.streams import close_stream, open_stream, save_stream
 
 RESERVE = 32_000_000
 """Bytes that must be free for a recording to be begun."""
@@ -34,7 +34,7 @@ def recording_file(
         blueprint: The layout.
 
     Raises:
-        Unwritten: If the disk is nearly full.
+        Unwritten: If the disk is nearly full, or full before the recording is whole.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     _check_room(path.parent)
@@ -52,8 +52,7 @@ def recording_file(
             recording.send_recording_name(name)
             yield recording
         finally:
-            recording.flush()
-            recording.disconnect()
+            close_stream(recording, part)
         with part.open("rb") as file:
             os.fsync(file.fileno())
         part.replace(path)

@@ -26,7 +26,7 @@ from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.keypoints import log_keypoint, log_rest_shape
 from dnet.recorders.rerun_scene import RerunScene
 from dnet.recorders.robot_description import read_urdf
-from dnet.recorders.streams import open_stream, save_stream
+from dnet.recorders.streams import close_stream, open_stream, save_stream
 from dnet.types import EpisodeMeta, Frame, Goal, Place, Point, Transform
 
 URDF = "psm.urdf"
@@ -101,6 +101,7 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
 
     Raises:
         BadEpisode: If a part of the episode cannot be read.
+        Unwritten: If the recording cannot be written.
     """
     goal = episode.target()
     recording = open_stream(
@@ -121,8 +122,7 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
         scene.log_goal(goal.cloud)
         return _replay_run(episode, scene, columns, goal)
     finally:
-        recording.flush()
-        recording.disconnect()
+        close_stream(recording, path)
 
 
 def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
@@ -134,6 +134,7 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
 
     Raises:
         BadEpisode: If one of them is no servo run, or a part of it cannot be read.
+        Unwritten: If the recording cannot be written.
     """
     recording = open_stream(
         COMPARISON_APPLICATION,
@@ -157,8 +158,7 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
             scene.log_goal(goal.cloud)
             end = max(end, _replay_run(episode, scene, columns, goal))
     finally:
-        recording.flush()
-        recording.disconnect()
+        close_stream(recording, path)
     return end
 
 

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from dnet.errors import NoLiveView
 from dnet.recorders.live_view import LiveView
-from dnet.recorders.streams import send_stream
+from dnet.recorders.streams import send_stream, writing_to
 
 PATIENCE_SECONDS = 3.0
 """How long a window may take to accept what it is sent, before the run goes on without it."""
@@ -41,7 +41,7 @@ class RunSinks:
         view: OpenView | None,
         say: Callable[[str], None],
     ) -> None:
-        self._recording, self._say = recording, say
+        self._recording, self._part, self._say = recording, part, say
         self._view: LiveView | None = None
         self._lost = False
         file = rr.FileSink(part)
@@ -50,12 +50,10 @@ class RunSinks:
                 self._view = view()
             except NoLiveView as error:
                 say(str(error))
-        if self._view is None:
-            send_stream(recording, file, blueprint=blueprint)
-        else:
+        window = [] if self._view is None else [rr.GrpcSink(self._view.address)]
+        with writing_to(part):
             # The file comes first: it is flushed whatever becomes of the window.
-            sinks = (file, rr.GrpcSink(self._view.address))
-            send_stream(recording, *sinks, blueprint=blueprint)
+            send_stream(recording, file, *window, blueprint=blueprint)
 
     def flush(self) -> None:
         """Bring everything to the file, and to the window."""
@@ -82,12 +80,13 @@ class RunSinks:
         watch.join()
 
     def _flush_file(self) -> None:
-        try:
-            self._recording.flush()
-        except RuntimeError as error:
-            # Rerun goes on to complain of a connection that is lost.
-            if not (self._lost and "gRPC" in str(error)):
-                raise
+        with writing_to(self._part):
+            try:
+                self._recording.flush()
+            except RuntimeError as error:
+                # Rerun goes on to complain of a connection that is lost.
+                if not (self._lost and "gRPC" in str(error)):
+                    raise
 
     def _lose(self, view: LiveView) -> None:
         # What hangs is ended: the connection breaks, and nothing waits for it any longer.

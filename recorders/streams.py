@@ -8,6 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 
+from dnet.errors import Unwritten
+
 
 def open_stream(
     application: str, *, recording_id: str | None = None, properties: bool = True
@@ -27,10 +29,40 @@ def open_stream(
     return rr.RecordingStream(application, recording_id=recording_id, send_properties=properties)
 
 
+@contextmanager
+def writing_to(path: Path) -> Iterator[None]:
+    """Say of a file that Rerun cannot write that it takes no more: it does not know an `OSError`.
+
+    Raises:
+        Unwritten: Instead of the error of Rerun.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        raise Unwritten(path.parent, f"{path.name} takes no more ({error})") from error
+
+
 def save_stream(stream: rr.RecordingStream, path: Path, *, blueprint: rrb.Blueprint | None) -> None:
-    """Write what is logged from now on to a file, with a layout for the application."""
-    with _in_memory(blueprint, rr.get_application_id(stream)) as layout:
+    """Write what is logged from now on to a file, with a layout for the application.
+
+    Raises:
+        Unwritten: If the file takes nothing.
+    """
+    with _in_memory(blueprint, rr.get_application_id(stream)) as layout, writing_to(path):
         rerun_bindings.save(str(path), layout, stream.to_native())
+
+
+def close_stream(stream: rr.RecordingStream, path: Path) -> None:
+    """Bring everything that was logged to its file, and close it.
+
+    Raises:
+        Unwritten: If the file did not take it.
+    """
+    try:
+        with writing_to(path):
+            stream.flush()
+    finally:
+        stream.disconnect()
 
 
 def send_stream(
@@ -58,5 +90,7 @@ def _in_memory(
     )
     stream.set_time("blueprint", sequence=0)
     blueprint._log_to_stream(stream)
-    yield rerun_bindings.memory_recording(stream.to_native())
-    stream.disconnect()
+    try:
+        yield rerun_bindings.memory_recording(stream.to_native())
+    finally:
+        stream.disconnect()

@@ -1,13 +1,19 @@
 """However many recordings a process writes one after another, no thread of them stays."""
 
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import psutil
+import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
-from dnet.recorders.streams import open_stream, save_stream, send_stream
+from dnet.errors import Unwritten
+from dnet.recorders.streams import close_stream, open_stream, save_stream, send_stream
 from tests.recorders.rrd import rows
 
 NAME = "dnet test"
@@ -22,8 +28,7 @@ def saved(path: Path, *, sinks: bool) -> None:
     else:
         save_stream(stream, path, blueprint=LAYOUT)
     stream.log("height", rr.Scalars(3.0), static=True)
-    stream.flush()
-    stream.disconnect()
+    close_stream(stream, path)
 
 
 def test_a_stream_that_was_closed_leaves_no_threads(tmp_path: Path) -> None:
@@ -46,5 +51,27 @@ def test_both_ways_write_the_values_and_the_layout(tmp_path: Path) -> None:
 def test_a_recording_can_do_without_a_layout(tmp_path: Path) -> None:
     stream = open_stream(NAME)
     save_stream(stream, tmp_path / "plain.rrd", blueprint=None)
-    stream.disconnect()
+    close_stream(stream, tmp_path / "plain.rrd")
     assert not RrdReader(tmp_path / "plain.rrd").blueprints()
+
+
+def test_a_file_that_takes_nothing_is_named() -> None:
+    with pytest.raises(Unwritten, match=r"written into /dev: full takes no more.*No space left"):
+        saved(Path("/dev/full"), sinks=False)
+
+
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """Have the system refuse to let files of this process grow beyond so many bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_file_that_takes_no_more_is_named(tmp_path: Path) -> None:
+    stream = open_stream(NAME, properties=False)
+    save_stream(stream, tmp_path / "film.rrd", blueprint=LAYOUT)
+    with largest_file(100_000), pytest.raises(Unwritten, match=r"film\.rrd takes no more"):
+        stream.log("points", rr.Points3D(np.random.default_rng(0).random((100_000, 3))))
+        close_stream(stream, tmp_path / "film.rrd")
