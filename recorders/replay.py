@@ -26,7 +26,7 @@ from dnet.recorders.goal_distance import GoalDistance
 from dnet.recorders.keypoints import log_keypoint, log_rest_shape
 from dnet.recorders.rerun_scene import RerunScene
 from dnet.recorders.robot_description import read_urdf
-from dnet.recorders.streams import close_stream, open_stream, save_stream
+from dnet.recorders.streams import open_stream, saved_stream
 from dnet.types import EpisodeMeta, Frame, Goal, Place, Point, Transform
 
 URDF = "psm.urdf"
@@ -109,8 +109,7 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
     )
     # When it was replayed says nothing of when it was recorded.
     recording.set_log_time_enabled(False)
-    try:
-        save_stream(recording, path, blueprint=_layout(goal, company))
+    with saved_stream(recording, path, blueprint=_layout(goal, company)):
         recording.send_recording_name(episode.meta.episode_id)
         scene = _scene(recording, episode)
         scene.name_joints(JOINT_NAMES)
@@ -121,8 +120,6 @@ def replay(episode: RecordedEpisode, path: Path, *, company: Company | None = "a
             return _replay_shapes(episode, recording, columns)
         scene.log_goal(goal.cloud)
         return _replay_run(episode, scene, columns, goal)
-    finally:
-        close_stream(recording, path)
 
 
 def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
@@ -144,8 +141,7 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
     names = [place_of(number) for number in range(len(episodes))]
     titles = {name: _title(episode) for name, episode in zip(names, episodes, strict=True)}
     end = 0.0
-    try:
-        save_stream(recording, path, blueprint=comparison_blueprint(titles))
+    with saved_stream(recording, path, blueprint=comparison_blueprint(titles)):
         recording.send_recording_name(" | ".join(titles.values()))
         for name, episode in zip(names, episodes, strict=True):
             goal = episode.target()
@@ -157,8 +153,6 @@ def replay_beside(episodes: Sequence[RecordedEpisode], path: Path) -> float:
             columns.send_lines(episode.lines())
             scene.log_goal(goal.cloud)
             end = max(end, _replay_run(episode, scene, columns, goal))
-    finally:
-        close_stream(recording, path)
     return end
 
 

@@ -1,15 +1,16 @@
 """Where the Rerun recording of a run goes: to its file, and perhaps to a window as well."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from dnet.errors import NoLiveView
+from dnet.errors import NoLiveView, Unwritten
 from dnet.recorders.live_view import LiveView
-from dnet.recorders.streams import send_stream, writing_to
+from dnet.recorders.streams import send_stream
 
 PATIENCE_SECONDS = 3.0
 """How long a window may take to accept what it is sent, before the run goes on without it."""
@@ -51,7 +52,7 @@ class RunSinks:
             except NoLiveView as error:
                 say(str(error))
         window = [] if self._view is None else [rr.GrpcSink(self._view.address)]
-        with writing_to(part):
+        with _writing(part):
             # The file comes first: it is flushed whatever becomes of the window.
             send_stream(recording, file, *window, blueprint=blueprint)
 
@@ -80,7 +81,7 @@ class RunSinks:
         watch.join()
 
     def _flush_file(self) -> None:
-        with writing_to(self._part):
+        with _writing(self._part):
             try:
                 self._recording.flush()
             except RuntimeError as error:
@@ -93,3 +94,11 @@ class RunSinks:
         view.end()
         self._view, self._lost = None, True
         self._say(LOST)
+
+
+@contextmanager
+def _writing(part: Path) -> Iterator[None]:
+    try:
+        yield
+    except RuntimeError as error:
+        raise Unwritten(part.parent, f"{part.name}: {error}") from error

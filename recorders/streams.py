@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 
-from dnet.errors import Unwritten
+from dnet.files.whole_file import write_whole
 
 
 def open_stream(
@@ -30,39 +30,27 @@ def open_stream(
 
 
 @contextmanager
-def writing_to(path: Path) -> Iterator[None]:
-    """Say of a file that Rerun cannot write that it takes no more: it does not know an `OSError`.
+def saved_stream(
+    stream: rr.RecordingStream, path: Path, *, blueprint: rrb.Blueprint | None
+) -> Iterator[None]:
+    """Write what is logged within to a file, with a layout for the application, and close it.
+
+    It is kept in memory until the end: on a full disk Rerun's own writer may wait for ever. Of an
+    exception nothing is written.
 
     Raises:
-        Unwritten: Instead of the error of Rerun.
+        Unwritten: If the file cannot be written.
     """
-    try:
-        yield
-    except RuntimeError as error:
-        raise Unwritten(path.parent, f"{path.name} takes no more ({error})") from error
-
-
-def save_stream(stream: rr.RecordingStream, path: Path, *, blueprint: rrb.Blueprint | None) -> None:
-    """Write what is logged from now on to a file, with a layout for the application.
-
-    Raises:
-        Unwritten: If the file takes nothing.
-    """
-    with _in_memory(blueprint, rr.get_application_id(stream)) as layout, writing_to(path):
-        rerun_bindings.save(str(path), layout, stream.to_native())
-
-
-def close_stream(stream: rr.RecordingStream, path: Path) -> None:
-    """Bring everything that was logged to its file, and close it.
-
-    Raises:
-        Unwritten: If the file did not take it.
-    """
-    try:
-        with writing_to(path):
-            stream.flush()
-    finally:
-        stream.disconnect()
+    with _in_memory(blueprint, rr.get_application_id(stream)) as layout:
+        logged = rerun_bindings.memory_recording(stream.to_native())
+        try:
+            if layout is not None:
+                rerun_bindings.send_blueprint(layout, recording=stream.to_native())
+            yield
+            content = logged.concat_as_bytes()
+        finally:
+            stream.disconnect()
+    write_whole(path, content)
 
 
 def send_stream(

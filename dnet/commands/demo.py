@@ -44,6 +44,7 @@ class Demo:
 
         from dnet.commands.demo_summary import held_out_goal, summary
         from dnet.commands.stages import Stages
+        from dnet.trials.trial import clear
 
         console = Console()
         options = {**asdict(self), "out": str(self.out)}
@@ -60,10 +61,12 @@ class Demo:
         steps.run(
             "train",
             f"dnet train --from-mcap {data} --out {train} --epochs {self.epochs} "
-            f"--seed {self.seed}",
-            Train(data, train, epochs=self.epochs, seed=self.seed),
+            f"--seed {self.seed} --resume",
+            Train(data, train, epochs=self.epochs, seed=self.seed, resume=True),
         )
         goal, frame = held_out_goal(data, train)
+        if "servo" not in steps.seconds:
+            clear(servo)  # of a run that was stopped: a run is never written over
         steps.run(
             "servo",
             f"dnet servo --checkpoint {train} --goal {goal}:{frame} --out {servo}",

@@ -79,31 +79,10 @@ class Reproduce:
                 raise TooFew(what, value, least)
 
 
-@dataclass(frozen=True)
-class ToTheEnd:
-    """A training that is gone on with unless it is finished, and counts as stopped until it is."""
-
-    training: Train
-
-    def run(self) -> None:
-        """Train what is left.
-
-        Raises:
-            KeyboardInterrupt: If it was stopped, which a training itself does not say.
-        """
-        from dnet.training.run import is_finished
-
-        if not is_finished(self.training.out):
-            self.training.run()
-        if not is_finished(self.training.out):
-            raise KeyboardInterrupt
-
-
 def command_of(line: str) -> Command:
     """Return what a command line of `dnet` stands for."""
     _, entry, *arguments = shlex.split(line)
-    command = tyro.cli(ENTRIES[entry], args=arguments)
-    return ToTheEnd(command) if isinstance(command, Train) else command
+    return tyro.cli(ENTRIES[entry], args=arguments)
 
 
 def _write_times(file: Path, seconds: dict[str, float]) -> None:

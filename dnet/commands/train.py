@@ -124,6 +124,7 @@ class Train:
 
         Raises:
             DnetError: If the episodes, the output directory or an option will not do.
+            KeyboardInterrupt: After Ctrl-C; what was learned is kept.
         """
         from rich.console import Console
 
@@ -177,6 +178,8 @@ class Train:
         self._fit(training, division, frames=frames, run=run, console=console)
         if process.first:
             finish(training, division, run=run, frames=frames, console=console, out=Console())
+        if training.stopped and training.progress < 1:
+            raise KeyboardInterrupt
 
     def _check(self) -> None:
         from dnet.errors import TooFew, TooShort, UnusedOption

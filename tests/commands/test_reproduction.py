@@ -9,7 +9,7 @@ from dnet.cli import main
 from dnet.commands.evaluate import Evaluate
 from dnet.commands.evaluate_paper import Paper
 from dnet.commands.record import Record
-from dnet.commands.reproduce import ToTheEnd, command_of
+from dnet.commands.reproduce import command_of
 from dnet.commands.reproduction import UNSEEN_SHAPES, Size, plan
 from dnet.commands.train import Train
 
@@ -62,7 +62,7 @@ def test_what_a_stage_takes_is_what_those_before_it_leave(tmp_path: Path) -> Non
 def test_nothing_learns_from_the_unseen_data(tmp_path: Path) -> None:
     found = commands(tmp_path, 0.02)
     recordings = [one for one in found.values() if isinstance(one, Record)]
-    trainings = [one.training for one in found.values() if isinstance(one, ToTheEnd)]
+    trainings = [one for one in found.values() if isinstance(one, Train)]
     assert len({one.seed for one in recordings}) == 2
     assert {str(one.from_mcap) for one in trainings} == {str(tmp_path / "data")}
     assert {one.model for one in trainings} == {"deformernet", "hu", "grasp", "dense", "keypoints"}
@@ -77,15 +77,6 @@ def test_the_report_is_made_with_the_networks_that_were_trained(tmp_path: Path) 
     found = [report.checkpoint, report.keypoints, report.regressor, report.dense]
     assert found == [runs / name for name in ("deformernet", "keypoints", "grasp", "dense")]
     assert report.runs == runs
-
-
-def test_a_training_that_was_stopped_stops_the_chain(tmp_path: Path) -> None:
-    class StoppedTraining(Train):
-        def run(self) -> None:
-            """Return as a training does after Ctrl-C: what it has is kept."""
-
-    with pytest.raises(KeyboardInterrupt):
-        ToTheEnd(StoppedTraining(tmp_path, tmp_path / "run")).run()
 
 
 @pytest.mark.parametrize(("option", "value"), [("--scale", 0.0), ("--workers", 0), ("--seed", -1)])

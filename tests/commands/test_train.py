@@ -148,7 +148,7 @@ def test_ctrl_c_keeps_everything_and_resume_goes_on_exactly(episodes: Path, tmp_
     process = begun(episodes, parts)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate()
-    assert process.returncode == 0, told
+    assert process.returncode == 130, told
     assert "interrupted after" in told
     assert "--resume goes on" in " ".join(told.split())
     assert len(untimed(parts)) < 60

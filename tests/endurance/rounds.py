@@ -5,7 +5,6 @@ from typing import Literal
 
 from dnet.commands.inspect_validate import Validate
 from dnet.commands.record import Record
-from dnet.commands.reproduce import ToTheEnd
 from dnet.commands.servo import Servo, ServoOptions
 from dnet.commands.train import Train
 
@@ -30,7 +29,7 @@ def work(folder: Path, *, number: int) -> None:
     ).run()  # fmt: skip
     Record(bullet, pairs=1, shapes=2, seed=number, points=POINTS, images=True).run()
     Validate((soft, bullet)).run()
-    ToTheEnd(Train(soft, network, epochs=3, seed=number)).run()
+    Train(soft, network, epochs=3, seed=number).run()
     worlds: dict[Literal["quasistatic", "bullet"], Path] = {"quasistatic": soft, "bullet": bullet}
     for world, data in worlds.items():
         options = ServoOptions(checkpoint=network, steps=2, world=world, seed=number)
