@@ -42,12 +42,12 @@ def saved_stream(
         Unwritten: If the file cannot be written.
     """
     with _in_memory(blueprint, rr.get_application_id(stream)) as layout:
-        logged = rerun_bindings.memory_recording(stream.to_native())
+        logged = stream.memory_recording()
         try:
             if layout is not None:
                 rerun_bindings.send_blueprint(layout, recording=stream.to_native())
             yield
-            content = logged.concat_as_bytes()
+            content = logged.drain_as_bytes()
         finally:
             stream.disconnect()
     write_whole(path, content)
