@@ -180,6 +180,7 @@ def test_ctrl_c_keeps_finished_episodes_and_the_frames_of_the_current_one(
             assert np.isfinite(episode.frame(0).cloud).all()
 
 
+@pytest.mark.slow
 def test_ten_kills_and_as_many_new_starts_write_the_bytes_of_an_undisturbed_run(
     tmp_path: Path,
 ) -> None:

@@ -124,7 +124,7 @@ def begun(episodes: Path, out: Path) -> subprocess.Popen[str]:
     On one thread, like the trainings of this process: sums on two end in other bits.
     """
     code = "import sys; from dnet.cli import main; sys.exit(main())"
-    words = ["train", "--from-mcap", str(episodes), "--out", str(out), "--epochs", "60"]
+    words = ["train", "--from-mcap", str(episodes), "--out", str(out), "--epochs", "30"]
     process = subprocess.Popen(
         [sys.executable, "-c", code, *words, "--device", "cpu"],
         stderr=subprocess.PIPE,
@@ -144,15 +144,15 @@ def untimed(run: Path) -> list[dict[str, Any]]:
 
 def test_ctrl_c_keeps_everything_and_resume_goes_on_exactly(episodes: Path, tmp_path: Path) -> None:
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    Train(from_mcap=episodes, out=whole, epochs=60, device="cpu").run()
+    Train(from_mcap=episodes, out=whole, epochs=30, device="cpu").run()
     process = begun(episodes, parts)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate()
     assert process.returncode == 130, told
     assert "interrupted after" in told
     assert "--resume goes on" in " ".join(told.split())
-    assert len(untimed(parts)) < 60
-    Train(from_mcap=episodes, out=parts, epochs=60, device="cpu", resume=True).run()
+    assert len(untimed(parts)) < 30
+    Train(from_mcap=episodes, out=parts, epochs=30, device="cpu", resume=True).run()
     assert untimed(parts) == untimed(whole)
     assert load(parts).state_dict().keys() == load(whole).state_dict().keys()
     for name, weights in load(parts).state_dict().items():
@@ -167,8 +167,8 @@ def test_a_killed_training_leaves_a_network_and_begins_again(
     process.communicate()
     for name in ("best", "last"):
         assert load(tmp_path / "run" / f"{name}.safetensors").config.points == POINTS
-    Train(from_mcap=episodes, out=tmp_path / "run", epochs=60, resume=True).run()
-    assert [line["epoch"] for line in untimed(tmp_path / "run")] == list(range(1, 61))
+    Train(from_mcap=episodes, out=tmp_path / "run", epochs=30, resume=True).run()
+    assert [line["epoch"] for line in untimed(tmp_path / "run")] == list(range(1, 31))
 
 
 def test_a_finished_training_has_nothing_to_go_on_with(

@@ -1,5 +1,6 @@
 """SIGKILL in the middle of each command: what is there can be read, and the command goes on."""
 
+import json
 from pathlib import Path
 
 import psutil
@@ -92,6 +93,24 @@ def test_a_killed_servo_run_keeps_its_steps_and_a_batch_goes_on(
     assert faults(first) == faults(second) == []
     assert not list(runs.rglob("*.part"))
     assert "2 runs in" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_killed_demo_goes_on_with_the_step_under_way(tmp_path: Path) -> None:
+    demo, log = tmp_path / "demo", tmp_path / "log"
+    asked = ["demo", "--out", str(demo), "--pairs", "2", "--shapes", "3", "--epochs", "30"]
+
+    def done() -> list[str]:
+        return list(json.loads((demo / "demo.json").read_text())["seconds"])
+
+    killed(*asked, log=log, at=lambda _: (demo / "train" / "metrics.jsonl").exists())
+    assert done() == ["record", "list"]
+    killed(*asked, log=log, at=lambda _: (demo / "servo" / "run.mcap.part").exists())
+    assert done() == ["record", "list", "train"]
+    main(asked)
+    assert len(done()) == 7
+    assert faults(demo / "servo") == []
+    assert not list(demo.rglob("*.part"))
 
 
 def test_a_killed_index_leaves_nothing_and_is_made_again(many: Path, tmp_path: Path) -> None:
