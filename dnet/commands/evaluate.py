@@ -47,6 +47,7 @@ class Ablations:
 
         Raises:
             DnetError: If the episodes or the directory will not do, or a name is unknown.
+            KeyboardInterrupt: After Ctrl-C; the same call goes on.
         """
         from rich.console import Console
         from rich.markdown import Markdown
@@ -71,9 +72,6 @@ class Ablations:
             run = self.out / name.replace(",", "").replace(" ", "-")
             if not is_finished(run):
                 self._train(run, name, index)
-            if not is_finished(run):
-                console.print("stopped; the same call goes on")
-                return
             found.append(read_ablation(name, run))
         table = table_of(found)
         write_whole(self.out / "ablations.md", table.encode())
