@@ -153,15 +153,13 @@ def _name(file: Place) -> str:
 
 
 def _check(file: Place) -> None:
-    if not _name(file).endswith((".mcap", ".rrd")):
-        raise UnknownRecording(Path(file))
-    if isinstance(file, str):
-        # Whether a store has an episode shows when that is opened; a run is no such file.
-        if not file.endswith(".mcap"):
-            raise MissingPath(file, "recording", "copy it to this machine, and play the copy")
-        return
-    if not file.is_file():
+    if isinstance(file, Path) and not file.is_file():
         hint = "`dnet inspect ls DIRECTORY` lists what was recorded"
         if (part := file.with_name(file.name + ".part")).is_file():
             hint = f"its recording did not finish; play what there is of it as {part}"
         raise MissingPath(file, "recording", hint)
+    if not _name(file).endswith((".mcap", ".rrd")):
+        raise UnknownRecording(Path(file))
+    # Whether a store has an episode shows when that is opened; a run is no such file.
+    if isinstance(file, str) and not file.endswith(".mcap"):
+        raise MissingPath(file, "recording", "copy it to this machine, and play the copy")

@@ -170,6 +170,7 @@ def test_a_folder_without_episodes_says_how_to_record(tmp_path: Path) -> None:
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.png").touch()
     with pytest.raises(UnknownRecording):
         run(tmp_path / "a.png")
 

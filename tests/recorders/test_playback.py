@@ -194,6 +194,8 @@ def test_other_files_are_refused(tmp_path: Path, name: str) -> None:
 def test_a_missing_file_is_named_and_its_unfinished_one_is_offered(tmp_path: Path) -> None:
     with pytest.raises(MissingPath, match=r"a\.mcap does not exist; `dnet inspect ls"):
         play([tmp_path / "a.mcap"], open_episode=EpisodeReader)
+    with pytest.raises(MissingPath, match="runs/none does not exist"):
+        play([tmp_path / "runs" / "none"], open_episode=EpisodeReader)
     (tmp_path / "a.mcap.part").touch()
     with pytest.raises(MissingPath, match=r"did not finish; play what there is of it as .*\.part"):
         play([tmp_path / "a.mcap"], open_episode=EpisodeReader)
