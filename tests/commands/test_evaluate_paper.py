@@ -193,7 +193,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 def test_the_page_opens_in_a_browser_without_an_error(made: Path, tmp_path: Path) -> None:
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
-        pytest.skip(f"no browser: none of {', '.join(BROWSERS)} is installed")
+        pytest.skip(f"no browser to open the page: install one of {', '.join(BROWSERS)}")
     # The console is said on stderr, where the browser also says other things.
     options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}"]
     console = ["--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"]

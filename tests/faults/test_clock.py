@@ -59,7 +59,7 @@ def work(folder: str) -> None:
 def test_recording_servoing_and_a_time_limit_go_by_other_clocks(tmp_path: Path) -> None:
     compiler = shutil.which("cc")
     if compiler is None:
-        pytest.skip("no C compiler (cc) to make a clock that jumps")
+        pytest.skip("no C compiler (cc) to make a clock that jumps; apt-get install gcc brings one")
     source, library = Path(__file__).with_name("jumping_clock.c"), tmp_path / "clock.so"
     made = [compiler, "-shared", "-fPIC", "-o", str(library), str(source), "-ldl"]
     subprocess.run(made, check=True)

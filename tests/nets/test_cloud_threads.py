@@ -1,5 +1,6 @@
 """Clouds are shared out among threads, each of them once."""
 
+import os
 import subprocess
 import sys
 import threading
@@ -52,7 +53,7 @@ def test_an_error_in_a_part_is_raised() -> None:
         torch.set_num_threads(before)
 
 
-@pytest.mark.skipif(not hasattr(__import__("os"), "fork"), reason="no fork on this system")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_forked_process_starts_its_own_threads() -> None:
     code = """
 import os, torch

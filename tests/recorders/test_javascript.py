@@ -60,7 +60,7 @@ def install(npm: list[str], place: Path) -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        pytest.skip("npm's registry does not answer")
+        pytest.skip("npm's registry, where the reader comes from, does not answer in two minutes")
     if done.returncode:
         said = re.findall(r"^npm (?:error|ERR!) (.*)$", done.stderr, re.MULTILINE)
         assert not any(f"code {code}" in said for code in OURS), done.stderr

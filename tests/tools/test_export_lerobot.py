@@ -185,7 +185,11 @@ def test_no_ground_truth_is_an_input(tmp_path: Path, data: Path) -> None:
     assert inputs == {"observation.cloud", "observation.state"}
 
 
-@pytest.mark.skipif(not PEERS, reason="DNET_PEERS names no Python with lerobot")
+@pytest.mark.skipif(
+    not PEERS,
+    reason="lerobot wants other versions than ours: install it in an environment of its own, and "
+    "let DNET_PEERS name the Python of that",
+)
 @pytest.mark.parametrize("bytes_a_file", [1, 2**20])
 def test_lerobot_opens_it_and_sees_what_was_logged(
     tmp_path: Path, data: Path, bytes_a_file: int
