@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
-from functools import cached_property, partial
+from functools import cached_property
 from multiprocessing import get_context
 from typing import Any
 
@@ -101,10 +101,14 @@ class CloudTables(ABC):
         if workers <= 1:
             yield from map(self._put, files)
             return
-        # A fork of a process with threads may hang.
+        # A fork of a process with threads may hang. So may a pool before Python 3.11.5 if a process
+        # dies while it is sent much (python/cpython#94777): the table goes once, not in each call.
+        pool = ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=_start, initargs=(self,)
+        )
         try:
-            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as executor:
-                yield from executor.map(partial(type(self)._put, self), files)
+            with pool:
+                yield from pool.map(_put, files)
         except BrokenProcessPool as error:
             raise WorkerDied(
                 f"described the clouds of {self.table.root}",
@@ -164,3 +168,17 @@ class CloudTables(ABC):
     @cached_property
     def _mapped(self) -> dict[int, tuple[Any, Records]]:
         return {}
+
+
+class _Process:
+    """What a process that finds tables keeps between files."""
+
+    tables: CloudTables
+
+
+def _start(tables: CloudTables) -> None:
+    _Process.tables = tables
+
+
+def _put(file: int) -> int:
+    return _Process.tables._put(file)

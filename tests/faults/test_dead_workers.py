@@ -2,7 +2,7 @@
 
 import os
 import signal
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from pathlib import Path
 
@@ -79,8 +79,12 @@ def test_a_dead_loader_worker_ends_the_stream_by_name(tmp_path: Path) -> None:
     elsewhere(lose_the_loader, tmp_path)
 
 
+@dataclass(frozen=True)
 class DyingTables(NeighbourTables):
-    """Tables whose describers are killed in the fifth file, as when memory runs out there."""
+    """Tables as large as the paper's, whose describers are killed in the fifth file."""
+
+    ballast: bytes = bytes(2_000_000)
+    """What 30,000 frames take; in the calls it hung Python before 3.11.5: python/cpython#94777."""
 
     def _put(self, file: int) -> int:
         if file == 4 and parent_process() is not None:
