@@ -40,3 +40,11 @@ def test_two_single_points_are_their_distance_apart() -> None:
     two = np.array([[0.03, 0.04, 0]], np.float32)
     assert chamfer(one, two) == pytest.approx(0.05)
     np.testing.assert_allclose(nearest_distances(one, two), [0.05], rtol=1e-6)
+
+
+def test_each_direction_counts_half() -> None:
+    one = np.array([[0, 0, 0]], np.float32)
+    two = np.array([[0, 0, 0], [0.3, 0, 0]], np.float32)
+    # From one to two nothing, back a mean of 0.15.
+    assert chamfer(one, two) == pytest.approx(0.075)
+    assert chamfer(two, one) == pytest.approx(0.075)

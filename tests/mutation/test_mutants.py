@@ -37,6 +37,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def exit_code(tree: Path, tests: tuple[str, ...]) -> int:
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    # Random examples find a mistake on some days; those that are written down find it on each.
+    command += ["-m", "not hypothesis"]
     # Two trees of the same age and size would pass for one among Python's compiled files.
     environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(

@@ -73,6 +73,12 @@ def test_a_lonely_point_has_a_larger_inverse_density_than_a_crowded_one() -> Non
     assert density[0] > 10 * density[1:].max()
 
 
+def test_each_point_of_a_crowd_counts_all_others() -> None:
+    crowd = np.random.default_rng(0).normal(scale=1e-6, size=(300, 3)).astype(np.float32)
+    found = find_neighbourhoods(crowd, FEW).inverse_densities[0].numpy()
+    np.testing.assert_allclose(found, 2.5 * BANDWIDTHS[0], rtol=1e-6)
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=20, deadline=None)
 def test_the_centroids_of_a_cloud_in_farthest_point_order_are_its_first_points(seed: int) -> None:

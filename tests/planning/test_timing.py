@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -60,6 +61,18 @@ def test_accelerations_keep_their_limits_between_samples() -> None:
         float((np.abs(velocity) / ARM.velocity).max()),
     )
     assert used > 0.95
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_short_motion_speeds_up_until_its_middle_and_slows_down_from_there(joint: int) -> None:
+    move = np.zeros(6)
+    move[joint] = 0.001
+    joints, times = timed(ARM, np.vstack([START, START + move]))
+    # Too short for any limit of speed: half the way at full acceleration, half at full braking.
+    fastest = 2 * np.sqrt(move[joint] / ARM.acceleration[joint])
+    assert times[-1] == pytest.approx(fastest, rel=1e-6)
+    along = np.interp(fastest / 2, times, joints[:, joint]) - START[joint]
+    assert along == pytest.approx(move[joint] / 2, rel=1e-6)
 
 
 def test_a_path_without_motion_takes_no_time() -> None:

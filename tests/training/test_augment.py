@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from dnet.nets.deformernet import prepare
 from dnet.nets.neighbourhoods import stack
-from dnet.training.augment import Augmentation, place, turn
+from dnet.training.augment import Augmentation, Placement, place, turn
 from tests.training.deforming_box import SMALL, BoxEpisode
 
 WIDE = Augmentation(yaw=np.pi, shift=0.05, mirror=True)
@@ -59,6 +59,17 @@ def test_placements_keep_distances_and_the_vertical_and_stay_in_their_limits(
     assert torch.equal(placement.shifts[:, 2], torch.zeros(16))
     if not mirror:
         assert float(torch.linalg.det(turns).min()) > 0.99
+
+
+def test_a_quarter_turn_turns_points_and_motions_from_x_to_y() -> None:
+    quarter = torch.tensor([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    placement, first = Placement(quarter, torch.zeros(1, 3)), torch.tensor([0])
+    motion = torch.tensor([[0.02, 0.0, 0.01]])
+    turned = turn(motion, placement, groups=first)
+    torch.testing.assert_close(turned, torch.tensor([[0.0, 0.02, 0.01]]))
+    clouds = stack([prepare(BoxEpisode(0).frame(0).cloud, SMALL)])
+    placed = place(clouds, placement, groups=first, coordinate_unit=SMALL.coordinate_unit)
+    torch.testing.assert_close(placed.points[..., 1], clouds.points[..., 0])
 
 
 def test_mirroring_comes_up_about_every_second_time() -> None:
