@@ -74,11 +74,15 @@ class RunSinks:
             self._recording.disconnect()
             return
         # Disconnecting waits for the window without a limit: one that hangs by now is ended.
-        watch = threading.Timer(PATIENCE_SECONDS, self._lose, (self._view,))
-        watch.start()
-        self._recording.disconnect()
-        watch.cancel()
-        watch.join()
+        closing = threading.Thread(target=self._recording.disconnect, daemon=True)
+        closing.start()
+        closing.join(PATIENCE_SECONDS)
+        if closing.is_alive():
+            self._lose(self._view)
+            closing.join(PATIENCE_SECONDS)
+        if closing.is_alive():
+            # The file is closed already, and Rerun would wait once more at the process's end.
+            rr.unregister_shutdown()
 
     def _flush_file(self) -> None:
         with _writing(self._part):

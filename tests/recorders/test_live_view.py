@@ -17,6 +17,7 @@ from dnet.recorders.live_view import LiveView
 from dnet.recorders.rerun_run import RerunRun
 from dnet.recorders.run_sinks import LOST, PATIENCE_SECONDS
 from dnet.sim.urdf import psm_urdf
+from tests.faults.children import elsewhere
 from tests.recorders.rollout import ARMS, GRASP, frames, step
 from tests.recorders.rrd import rows
 from tests.recorders.viewers import alive, ends, stand_in
@@ -147,6 +148,24 @@ def test_a_window_that_hangs_holds_nothing_up(
         assert said == [LOST]
         assert ends(window.process)
     check_whole(tmp_path / "run.rrd", 2)
+
+
+def leave_a_window_that_hangs(folder: str) -> None:
+    path, views, said = Path(folder), Views(), list[str]()
+    with start(path / "run.rrd", views, said) as run:
+        write_step(run, 0)
+        views.opened[0].end = lambda: None  # type: ignore[method-assign]
+        os.kill(int((path / "number").read_text()), signal.SIGSTOP)
+        write_step(run, 1)
+    assert said == [LOST]
+    check_whole(path / "run.rrd", 2)
+
+
+def test_a_window_that_cannot_even_be_ended_holds_up_neither_the_run_nor_its_end(
+    window: Window, tmp_path: Path
+) -> None:
+    assert not window.seen.exists()
+    elsewhere(leave_a_window_that_hangs, tmp_path)
 
 
 def test_a_viewer_that_does_not_start_is_done_without(
